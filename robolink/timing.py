@@ -4,12 +4,14 @@ Whoever waits does so on an injected :class:`Clock`, in integer nanoseconds of a
 monotonic time. Wall time appears in records only, as a label.
 """
 
+from collections import deque
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, runtime_checkable
 
 from robolink import runtime
 
 __all__ = [
+    "AnswerTimes",
     "Clock",
     "Deadline",
     "FASTEST_ANSWER_S",
@@ -82,6 +84,52 @@ class Deadline(NamedTuple):
     def expired(self) -> bool:
         """Whether the instant has been reached."""
         return self.clock.now_ns() >= self.at_ns
+
+
+class AnswerTimes:
+    """How long the far end of a connection takes to answer, and for how many answers one waits.
+
+    Attributes:
+        clock: The clock of the connection.
+        waited: How many answers held up what came next.
+        moving: How many more came while a movement was under way.
+
+    Example:
+        >>> from robolink.timing import AnswerTimes, SystemClock
+        >>> times = AnswerTimes(SystemClock())
+        >>> times.median_s is None
+        True
+        >>> times.answered(times.clock.now_ns())
+        >>> times.median_s < 1
+        True
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.waited = self.moving = 0
+        self._last_ns: deque[int] = deque(maxlen=_LAST_ANSWERS)
+
+    def answered(self, asked_ns: int, *, moving: bool = False) -> None:
+        """Note an answer that came just now.
+
+        Args:
+            asked_ns: When its request was sent.
+            moving: Whether a movement is under way.
+        """
+        self._last_ns.append(self.clock.now_ns() - asked_ns)
+        self.waited += not moving
+        self.moving += moving
+
+    @property
+    def median_s(self) -> float | None:
+        """The median of the last answers; ``None`` before the first one."""
+        if not self._last_ns:
+            return None
+        return sorted(self._last_ns)[len(self._last_ns) // 2] / NS_PER_S
+
+
+_LAST_ANSWERS = 64
+"""Number of answers that are kept: those of connecting, and of what is read before a movement."""
 
 
 def wall_label() -> str:

@@ -5,6 +5,7 @@ same run with all that a recipe adds to it: questions, outputs, references, stat
 """
 
 from robolink.calibration_run._acceptance import AcceptanceCriteria
+from robolink.calibration_run._forecast import Forecast
 from robolink.calibration_run._length import known_height
 from robolink.calibration_run._measurement import accuracy_facts, assessed_in_cell
 from robolink.calibration_run._nozzle_change import DescribeReport, Earlier, NozzleChange
@@ -62,6 +63,7 @@ __all__ = [
     "ChangeReport",
     "DescribeReport",
     "Earlier",
+    "Forecast",
     "LimitVerdict",
     "Limits",
     "Listener",

@@ -20,11 +20,29 @@ from robolink.calibration_run._repeatability import seating_of
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.methods import find_method
-from robolink.model import Controller, NewEntry, Pose, ToolOffset, says_it_is_simulated
+from robolink.model import (
+    Controller,
+    NewEntry,
+    Pose,
+    TipSensor,
+    ToolOffset,
+    says_it_is_simulated,
+)
 from robolink.procedures import MeasurementContext, touches_of
 from robolink.procedures.source import touching_further
 from robolink.remedy_words import RemedyWord, remedy_word
-from robolink.runner import AGAIN, BACK, MORE, Ask, Look, Seek, StepDone, TouchedAt
+from robolink.runner import (
+    AGAIN,
+    BACK,
+    MORE,
+    Ask,
+    Look,
+    RobotTime,
+    Runner,
+    Seek,
+    StepDone,
+    TouchedAt,
+)
 from robolink.stations import stations_on_record
 
 
@@ -125,20 +143,46 @@ _INSTRUMENT: Final = frozenset({"no_edge", "sensor_failed", "tip_not_seen", "fid
 """Codes of measurements that ended because a sensor or camera detected nothing."""
 
 
+class TimedContext(MeasurementContext):
+    """A context whose runners all count for one robot time.
+
+    Attributes:
+        robot_time: It; ``None`` where nobody wants to know.
+    """
+
+    robot_time: RobotTime | None = None
+
+    def runner(
+        self,
+        tip: ToolOffset | None = None,
+        camera: TipSensor | None = None,
+        *,
+        tool: int | None = None,
+    ) -> Runner:
+        """Return a runner that counts for it; see the context."""
+        runner = super().runner(tip, camera, tool=tool)
+        runner.robot_time = self.robot_time or runner.robot_time
+        return runner
+
+
 class Measuring:
     """Measures the tools of one change.
 
     Args:
         context: What the sources work with.
         listener: Told of steps and refusals.
+        robot_time: Counts how long the robot takes.
 
     Attributes:
         simulated: Whether the controller says that nothing real moves.
     """
 
-    def __init__(self, context: MeasurementContext, listener: Listener) -> None:
+    def __init__(
+        self, context: MeasurementContext, listener: Listener, robot_time: RobotTime
+    ) -> None:
         self._context = context
         self._listener = listener
+        self._time = robot_time
         self._facts = context.controller.facts()
         self.simulated = says_it_is_simulated(context.controller, self._facts)
 
@@ -154,6 +198,7 @@ class Measuring:
             try:
                 return self._attempt(plan, partial(plan.source.measure, self._context, plan.tool))
             except CalibrationError as error:
+                self._time.unusual()
                 # A restart by a person does not count as one of the plan's attempts.
                 by_hand = error.code == AGAIN and anew > 0
                 self._listener.refused(plan.tool, error, again=by_hand or left > 0)
@@ -175,6 +220,7 @@ class Measuring:
         """
         source = touching_further(plan.source)
         assert source is not None  # noqa: S101 - further touches were offered
+        self._time.unusual()
         what = tr("one more touch") if again is None else tr("touch {k} again", k=again + 1)
         self._context.controller.outcomes.append(decision_entry(what, tool=plan.tool))
 
@@ -197,7 +243,9 @@ class Measuring:
         controller.tools.select(0)
         here = controller.groups[0].pose()
         goal = pose if turn else replace(pose, u_deg=here.u_deg)
-        self._context.run(journey(goal, purpose, here))
+        self._time.stands = here
+        with self._time.journey_to(pose):
+            self._context.run(journey(goal, purpose, here))
 
     def _attempt(
         self, plan: ToolPlan, measure: Callable[[ToolOffset | None], CalibrationResult]

@@ -17,6 +17,7 @@ from robolink.calibration_run._measurement import (
     FurtherOffer,
     FurtherTouch,
     Measuring,
+    TimedContext,
     offer_of,
 )
 from robolink.calibration_run._open_turn_test import marked_turn_tests
@@ -56,7 +57,7 @@ from robolink.model import (
     new_operation,
 )
 from robolink.procedures import KeepsProof, MeasurementContext
-from robolink.runner import Operator, regard
+from robolink.runner import Operator, RobotTime, regard
 from robolink.timing import NS_PER_S
 from robolink.transaction import Order, ToolChange, Wanted, plain_result
 
@@ -79,6 +80,7 @@ class NozzleChange:
         earlier: Where the corrections of before are found, for the refusal of growing ones.
         order: The order that it carries out (:func:`robolink.transaction.carrying_out`).
         describe: Makes the result of the order, plain JSON, from what the change did.
+        robot_time: Counts how long the robot takes.
 
     Example:
         >>> from robolink.methods import PointsSource
@@ -107,8 +109,10 @@ class NozzleChange:
         earlier: Earlier = lambda _tool: (),
         order: Order | None = None,
         describe: DescribeReport | None = None,
+        robot_time: RobotTime | None = None,
     ) -> None:
         self._controller = controller
+        self._time = robot_time or RobotTime(controller)
         limits = controller.change_guard.limits
         tools = (replace(one, criteria=one.criteria.within(limits)) for one in plan.tools)
         self._plan = replace(plan, tools=tuple(tools))
@@ -141,7 +145,7 @@ class NozzleChange:
         with self._controller.procedure(self._request), self._begun():
             self._require_possible(write=write)
             context = self._context(write=write)
-            measuring = Measuring(context, self._listener)
+            measuring = Measuring(context, self._listener, self._time)
             self._simulated = measuring.simulated
             measuring.go_to(self._plan.safe, tr("Moving to the safe pose."))
             self._listener.moment(Moment.START, context)
@@ -229,7 +233,7 @@ class NozzleChange:
             self._controller.tools.select(0)
             start = self._controller.groups[0].pose()
         settings = self._plan.limits.settings
-        return MeasurementContext(
+        context = TimedContext(
             self._controller,
             self._operator,
             start=start,
@@ -238,6 +242,8 @@ class NozzleChange:
             attended=self._plan.asks,
             types=write and all(one.verify and one.moving for one in self._plan.tools),
         )
+        context.robot_time = self._time
+        return context
 
     def _checked(
         self, context: MeasurementContext, proposals: Proposals, *, write: bool
@@ -397,6 +403,7 @@ class NozzleChange:
             self._controller.outcomes.append(refusal_entry(tool, criteria, error))
 
         def turned() -> VerifyResult:
+            self._time.now_in(tool, proposal.offset)
             with (
                 context.telling(lambda done: self._listener.step(tool, done), tool=tool),
                 touches_counting(
@@ -414,6 +421,10 @@ class NozzleChange:
                     tolerance_mm=criteria.drift_tolerance_mm,
                 )
 
+        def turned_again() -> VerifyResult:
+            self._time.unusual()
+            return turned()
+
         attended = None
         if self._plan.asks:
             person = context.runner(tool=tool)
@@ -421,7 +432,7 @@ class NozzleChange:
                 person.choose,
                 person.confirm,
                 # A proof that uses plain values can be repeated from where it ended.
-                turned if isinstance(source, KeepsProof) else None,
+                turned_again if isinstance(source, KeepsProof) else None,
                 relearning_commands(self._controller, plan, proposal.result),
             )
         return conclude_turn_test(

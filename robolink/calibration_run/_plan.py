@@ -195,6 +195,11 @@ class ChangePlan:
         return self.ask_before_write if self.attended is None else self.attended
 
     @property
+    def start(self) -> Pose | None:
+        """The first pose to which the robot goes; ``None`` where it begins where it is."""
+        return self.safe or self.tools[0].approach
+
+    @property
     def moves(self) -> bool:
         """Whether the robot moves."""
         return any(plan.moving for plan in self.tools)

@@ -53,6 +53,7 @@ class PlannedStep:
         edge: The input that ends the step on the way, ``None`` for none.
         refusal: Why the limits forbid it, empty when they do not.
         shown: What a person has to show, ``None`` where nobody is asked.
+        start: Where the flange is before a movement; behind a touch, where that is expected.
     """
 
     text: str
@@ -61,6 +62,7 @@ class PlannedStep:
     edge: InputEdge | None = None
     refusal: str = ""
     shown: TeachPrompt | None = None
+    start: Pose | None = None
 
     def target_is(self, place: Pose) -> bool:
         """Return whether it ends at a place."""
@@ -210,7 +212,7 @@ def _planned_steps(
         elif isinstance(step, Look):
             yield PlannedStep(step.purpose)
         else:
-            planned = _planned(step, settings)
+            planned = replace(_planned(step, settings), start=one.start)
             arrives = goal is not None and planned.target_is(goal)
             if arm and move and not planned.refusal and (one.known or arrives):
                 start = one.start if one.known else None

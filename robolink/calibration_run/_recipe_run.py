@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from robolink.calibration_run._forecast import Forecast, RunForecaster, work_digest
 from robolink.calibration_run._nozzle_change import DescribeReport, NozzleChange
 from robolink.calibration_run._plan import ChangePlan, require_ready
 from robolink.calibration_run._preview import preview, require_inside
@@ -25,7 +26,7 @@ from robolink.model import (
 )
 from robolink.recipe import Answers, beyond
 from robolink.remedy_words import RemedyWord, remedy_word
-from robolink.runner import Operator
+from robolink.runner import Operator, RobotTime
 from robolink.stations import Station, find_stations, require_base_of, stations_on_record
 from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
 
@@ -42,6 +43,9 @@ class RecipeRun:
             after :meth:`preflight`.
         changed: Tools that somebody else changed since they were last written from here; known
             after :meth:`preflight`.
+        forecast: How long the robot will take; known after :meth:`preflight`, ``None`` where
+            nothing moves.
+        robot_s: How long it took, in s; known after :meth:`run`.
 
     Args:
         controller: The controller, connected.
@@ -133,7 +137,11 @@ class RecipeRun:
             )
         self.takes_reference = take_reference
         self.changed: tuple[ChangedSince, ...] = ()
-        self._looked_ahead = False
+        self.forecast: Forecast | None = None
+        self.robot_s: float | None = None
+        self._of_file = loaded.recipe
+        self._other_sensor = sensor if isinstance(sensor, str) else type(sensor).__name__
+        self._ahead: RunForecaster | None = None
 
     def preflight(self) -> None:
         """Check, by reading only, everything that would end the run later.
@@ -179,8 +187,16 @@ class RecipeRun:
                 remedy=tr("Record the reference first, in a run without an order."),
             )
         require_ready(controller, self.plan)
-        require_inside(controller, preview(controller, self.plan))
-        self._looked_ahead = True
+        steps = preview(controller, self.plan)
+        require_inside(controller, steps)
+        work = work_digest(
+            self._of_file,
+            self.plan,
+            version=controller.outcomes.signature.version,
+            more=f"{self.takes_reference} {self._measure_only} {self._other_sensor}",
+        )
+        self._ahead = RunForecaster(controller, self._loaded.name, work, self.plan, steps)
+        self.forecast = self._ahead.forecast()
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
         """Ask for the ids of nozzles and lots before anything moves; yield each.
@@ -205,14 +221,25 @@ class RecipeRun:
                 :meth:`robolink.calibration_run.NozzleChange.run`; outputs that the recipe switched
                 stay as they are, and the error names them.
         """
-        if not self._looked_ahead:
+        if self._ahead is None:
             self.preflight()
+        time = RobotTime(self._controller, self.plan.start)
         with self._signed():
             listener = self._listener()
-            with self._outputs_told(listener):
-                return self._change(listener).run(
+            with self._outputs_told(listener), time.counted():
+                report = self._change(listener, time).run(
                     write=not (self.takes_reference or self._measure_only)
                 )
+            self.robot_s = time.seconds if self.plan.moves else None
+            self._record(time, report)
+        return report
+
+    def _record(self, time: RobotTime, report: ChangeReport) -> None:
+        """Record how long the robot took; what was done does not depend on it."""
+        entry = self._ahead.entry(time, report.change) if self._ahead else None
+        if entry is not None:
+            with suppress(ConfigError, RobolinkError):
+                self._controller.outcomes.append(entry)
 
     def _listener(self) -> RecipeListener:
         """Return the listener for the recipe's part; it signs as the run does now."""
@@ -227,7 +254,7 @@ class RecipeRun:
             audience=self._audience,
         )
 
-    def _change(self, listener: RecipeListener) -> NozzleChange:
+    def _change(self, listener: RecipeListener, time: RobotTime) -> NozzleChange:
         return NozzleChange(
             self._controller,
             self.plan,
@@ -236,6 +263,7 @@ class RecipeRun:
             earlier=partial(earlier_corrections, self._controller),
             order=self._order,
             describe=self._describe,
+            robot_time=time,
         )
 
     @contextmanager

@@ -31,6 +31,7 @@ from robolink.model import (
     ToolTable,
     VariableTable,
 )
+from robolink.timing import AnswerTimes
 
 if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
@@ -135,6 +136,11 @@ class ControllerCore(DriverPart, ABC):
         """Do what is proper before the link is closed; errors are ignored."""
 
     # What a kind may have; created only when a command needs it.
+
+    @property
+    def answers(self) -> AnswerTimes | None:
+        """How long it takes to answer; not measured here."""
+        return None
 
     @property
     def io(self) -> DigitalIo | None:

@@ -19,7 +19,7 @@ from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog, Resolver
 from robolink.model._status import ControllerStatus
 from robolink.model._tools import ToolTable
 from robolink.stop_latch import Patience, StopLatch
-from robolink.timing import Clock
+from robolink.timing import AnswerTimes, Clock
 
 Value = bool | int | float | str
 ValueT = TypeVar("ValueT", bound=Value)
@@ -219,6 +219,10 @@ class Controller(Protocol):
     @property
     def exchanges(self) -> int:
         """Requests sent so far."""
+
+    @property
+    def answers(self) -> AnswerTimes | None:
+        """How long it takes to answer; ``None`` for a kind that does not measure it."""
 
     @property
     def outcomes(self) -> OutcomeLog:

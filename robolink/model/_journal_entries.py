@@ -39,6 +39,7 @@ class EntryKind(StrEnum):
     CHECK = "check"
     ACCURACY = "accuracy"
     ORDER = "order"
+    RUN = "run"
 
 
 PROOFS: Final = (
@@ -54,6 +55,7 @@ NO_HISTORY: Final = (
     EntryKind.RECONNECT,
     EntryKind.LEASE,
     EntryKind.CHECK,
+    EntryKind.RUN,
 )
 """Kinds of entries about a controller that do not record a change."""
 

@@ -264,6 +264,7 @@ _NOT_ABOUT_A_CHANGE = (
     EntryKind.LEASE,
     EntryKind.RECONNECT,
     EntryKind.RAW,
+    EntryKind.RUN,
     EntryKind.DECISION,
 )
 """Kinds of entries whose tool, if any, was not changed."""

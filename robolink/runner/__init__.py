@@ -41,6 +41,7 @@ from robolink.runner._prompt_context import (
     awaited_line,
     regard,
 )
+from robolink.runner._robot_time import RobotTime, TimedMove, TimeShare, way_between
 from robolink.runner._runner import EndingWatch, Runner, ask_for_pose
 from robolink.runner._steps import (
     FINEST_STEP,
@@ -92,6 +93,7 @@ __all__ = [
     "POLL_S",
     "Procedure",
     "Question",
+    "RobotTime",
     "RunSettings",
     "Runner",
     "SETTLING_S",
@@ -102,6 +104,8 @@ __all__ = [
     "TakenAgainError",
     "TakenStep",
     "TeachPrompt",
+    "TimeShare",
+    "TimedMove",
     "TouchSubject",
     "TouchedAt",
     "ask_for_pose",
@@ -118,6 +122,7 @@ __all__ = [
     "parse_steps",
     "refuse_decimal_comma",
     "regard",
+    "way_between",
     "way_in_words",
     "yes_or_no",
 ]

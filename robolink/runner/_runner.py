@@ -49,6 +49,7 @@ from robolink.runner._prompt_context import (
     Operator,
     awaited_line,
 )
+from robolink.runner._robot_time import RobotTime
 from robolink.runner._steps import (
     Ask,
     Confirm,
@@ -125,6 +126,7 @@ _MOST_REPEATS: Final = 2
 """
 
 T = TypeVar("T")
+PoseT = TypeVar("PoseT", bound=Pose)
 
 
 class Runner:
@@ -144,6 +146,9 @@ class Runner:
         ending: Looks for what ends it, ``None`` for one of its own.
         tool: Number of the tool that it is about, for the record of what is answered; ``None``
             where it is about none or several.
+
+    Attributes:
+        robot_time: Counts how long the robot takes; whoever has several runners gives them one.
 
     Every answer is recorded here, and not by whoever asks; see :class:`Asking`.
 
@@ -178,6 +183,7 @@ class Runner:
         self._operator = operator
         self._guided = operator if isinstance(operator, GuidedOperator) else None
         self._settings = settings
+        self.robot_time = RobotTime(controller)
         self._on_step = on_step
         self._camera = camera
         self._offers = offers
@@ -205,6 +211,7 @@ class Runner:
                 try:
                     done = self._take(step)
                 except CalibrationError as error:
+                    self.robot_time.unusual()
                     # The procedure may draw the tip back before it ends.
                     step = procedure.throw(error)
                     continue
@@ -228,7 +235,8 @@ class Runner:
 
         def go() -> MotionOutcome:
             motion = self._group.move_to(target, profile, box=self._settings.box)
-            return motion.wait(timeout_s=self._settings.motion_timeout_s)
+            with self.robot_time.awaiting(target, path):
+                return motion.wait(timeout_s=self._settings.motion_timeout_s)
 
         outcome = self._seen_through(go, target)
         if outcome is not MotionOutcome.ARRIVED:
@@ -237,7 +245,7 @@ class Runner:
                 remedy=tr("The robot will not move by itself. Start again when the cell is clear."),
                 controller=self._controller.identity,
             )
-        return self._group.pose()
+        return self._stood(self._group.pose())
 
     def jog(self, steps: str) -> Pose:
         """Move by typed steps, for example ``x+0.1 z-0.5``, in one straight move.
@@ -269,6 +277,8 @@ class Runner:
                 return StepDone(step)
             said = self.confirm_or(step.question, also=step.also)
             word = said if isinstance(said, str) else ""
+            if said:
+                self.robot_time.unusual()
             return StepDone(step, accepted=said is True, word=word)
         return StepDone(step, self._moved(step))
 
@@ -316,7 +326,8 @@ class Runner:
                 motion = self._group.move_until_input(
                     step.target, step.edge, speed_mm_s=step.speed_mm_s, box=settings.box
                 )
-            return motion.wait(timeout_s=settings.motion_timeout_s)
+            with self.robot_time.awaiting():
+                return motion.wait(timeout_s=settings.motion_timeout_s)
 
         found = self._seen_through(go, step.target)
         if found is None:
@@ -328,7 +339,12 @@ class Runner:
                     "where the station says."
                 ),
             )
-        return found
+        return self._stood(found)
+
+    def _stood(self, pose: PoseT) -> PoseT:
+        """Return where the frame is, and note it for the robot time."""
+        self.robot_time.stands = pose
+        return pose
 
     def _ask(self, step: Ask) -> Pose:
         question = PlaceQuestion(
@@ -341,7 +357,8 @@ class Runner:
             runs=lambda: self._runs,
             typed=self._typed_pose if self._types else None,
         )
-        return question.answer()
+        with self.robot_time.person():
+            return self._stood(question.answer())
 
     def _jogged(self, steps: str) -> bool:
         """Jog, and return whether another question came between."""
@@ -365,6 +382,7 @@ class Runner:
                 if not self._repeats_left or not self._stands(target) or not self._again():
                     raise
                 self._repeats_left -= 1
+                self.robot_time.unusual()
 
     def _stands(self, target: Pose) -> bool:
         """Whether the robot has stopped, is ready, and has the step's tool selected."""
@@ -413,15 +431,18 @@ class Runner:
             Keep it?
             'more'
         """
-        return self._asking.confirm_or(question, also=also, decides=decides)
+        with self.robot_time.person():
+            return self._asking.confirm_or(question, also=also, decides=decides)
 
     def choose(self, question: str, offered: OfferedChoice) -> int:
         """Let a person choose one of several rows under this watch; see :meth:`Asking.choose`."""
-        return self._asking.choose(question, offered)
+        with self.robot_time.person():
+            return self._asking.choose(question, offered)
 
     def ask_text(self, question: str) -> str:
         """Ask for a line of text under the same watch; see :meth:`Asking.text`."""
-        return self._asking.text(question)
+        with self.robot_time.person():
+            return self._asking.text(question)
 
     def _line(self, between: Callable[[], object] | None = None) -> str:
         """Return the next line typed, reading the status at least once a second meanwhile.

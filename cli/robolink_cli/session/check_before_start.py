@@ -71,8 +71,11 @@ def check_before_start(
     box_mm: float,
     at: "StationKind | None",
     tools: "Sequence[int]" = (),
+    takes: str = "",
 ) -> None:
     """Let the person at the desk go through the list; arguments as above.
+
+    ``takes`` says how long the robot will take, in a sentence.
 
     Raises:
         NotReadyError: Nothing can move now, and no key of the list changes that.
@@ -93,6 +96,7 @@ def check_before_start(
             "The robot will move by itself {n} times: up to {v} mm/s, at most {d} mm from here.",
             **foreseen,
         )
+    plan = joined(" ", [plan, takes]) if takes else plan
     tried, left = False, (saved_tools(controller), *_as_left(controller, tools))
     new = _new_nozzle(at)
     while _answer_to_list(desk, controller, purpose, plan, left, new, tried=tried) != "y":

@@ -53,6 +53,7 @@ from robolink.protocols import spel
 from robolink.protocols.epson_text import Preference, Refusal, Reply, Request
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
+from robolink.timing import AnswerTimes
 from robolink.transport import LinkUrl
 
 if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
@@ -147,6 +148,11 @@ class EpsonController(ControllerCore):
     def exchanges(self) -> int:
         """Requests sent so far."""
         return self._link.session.exchanges
+
+    @property
+    def answers(self) -> AnswerTimes:
+        """How long it takes to answer."""
+        return self._link.session.answers
 
     def published_tools(self) -> PublishedTools | None:
         """Read the tools as the companion program published them; allowed while production runs.

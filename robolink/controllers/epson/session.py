@@ -45,7 +45,7 @@ from robolink.protocols.epson_text import (
 )
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass, StopLatch
-from robolink.timing import Deadline
+from robolink.timing import AnswerTimes, Deadline
 
 _CALM: Final = frozenset({"stop", "abort", "pause", "resetalm", "setmotorsoff"})
 _SESSION: Final = frozenset({"login", "logout"})
@@ -121,6 +121,7 @@ class EpsonSession(EpsonConversation):
     Attributes:
         place: Where it was reached, the same for each spelling of the URL.
         exchanges: Requests sent so far.
+        answers: How long the answers took, but for those of statements that take their time.
         latch: Refuses requests while a stop is active.
         settings_reset: How many requests were sent after which power and speed are set anew,
             whatever is read.
@@ -134,6 +135,7 @@ class EpsonSession(EpsonConversation):
         super().__init__(line, timeout_s=timeout_s)
         self.place = line.transport.place
         self.exchanges = 0
+        self.answers = AnswerTimes(self.clock)
         self._wire = runtime.lock()
         self._gate = InterruptGate()
         self._gate.open()
@@ -145,6 +147,11 @@ class EpsonSession(EpsonConversation):
     def pending(self) -> PendingExecute | None:
         """The Execute that was not yet taken as finished, if any."""
         return self._pending
+
+    @property
+    def _under_way(self) -> bool:
+        """Whether a statement that takes its time is not answered yet."""
+        return self._pending is not None and self._pending.answer is None
 
     def carries(self, name: str) -> bool:
         """Whether a command of this name can be sent over this line."""
@@ -162,7 +169,10 @@ class EpsonSession(EpsonConversation):
                     deadline = Deadline.after(self.clock, self.timeout_s)
                     self._transport.send(data, deadline=deadline, secret=secret)
                     self.exchanges += 1
-                    return self._receive(request, deadline, secret=secret)
+                    sent_ns = self.clock.now_ns()
+                    answer = self._receive(request, deadline, secret=secret)
+                    self.answers.answered(sent_ns, moving=self._under_way)
+                    return answer
                 except RobolinkError as error:
                     self._end(error)
                     raise
@@ -185,6 +195,7 @@ class EpsonSession(EpsonConversation):
                     deadline = Deadline.after(self.clock, self.timeout_s)
                     self._transport.send(data, deadline=deadline)
                     self.exchanges += 1
+                    self.answers.waited += 1
                 except RobolinkError as error:
                     self._end(error)
                     raise

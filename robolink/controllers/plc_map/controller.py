@@ -33,7 +33,7 @@ from robolink.model import (
 )
 from robolink.register_maps import RegisterMap, load_map, span_of
 from robolink.remedy_words import RemedyWord, remedy_word
-from robolink.timing import Clock
+from robolink.timing import AnswerTimes, Clock
 from robolink.transport import LinkUrl, open_modbus
 
 if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
@@ -213,6 +213,11 @@ class PlcMapController(ControllerCore):
     def exchanges(self) -> int:
         """Requests sent so far."""
         return self._plc.registers.exchanges
+
+    @property
+    def answers(self) -> AnswerTimes:
+        """How long it takes to answer."""
+        return self._plc.registers.answers
 
     def who(self) -> Identity:
         """Return which PLC this is: what a person confirms about a map is valid for that one.

@@ -40,7 +40,7 @@ from robolink.register_maps import (
     describe_place,
 )
 from robolink.stop_latch import CommandClass, StopLatch
-from robolink.timing import Clock
+from robolink.timing import AnswerTimes, Clock
 
 _TRIES: Final = 3
 
@@ -94,6 +94,7 @@ class Registers:
         place: Where it was reached, the same for each spelling of the URL.
         clock: The clock on which its time passes.
         exchanges: Requests sent so far.
+        answers: How long reads took to be answered.
         gate: Holds Ctrl-C back inside an exchange, and inside whatever else enters it.
         latch: Refuses writes while a stop is active.
     """
@@ -102,6 +103,7 @@ class Registers:
         self._client = client
         self.identity, self.place, self.clock = client.identity, client.place, client.clock
         self.exchanges = 0
+        self.answers = AnswerTimes(client.clock)
         self.gate = InterruptGate()
         self.gate.open()
         self.latch = StopLatch(client.identity)
@@ -124,7 +126,9 @@ class Registers:
         for start in range(addresses.start, addresses.stop, most):
             with self.gate:
                 self.exchanges += 1
+                sent_ns = self.clock.now_ns()
                 found += map(int, readers[table](start, min(most, addresses.stop - start)))
+                self.answers.answered(sent_ns)
         return tuple(found)
 
     def read_twice(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:

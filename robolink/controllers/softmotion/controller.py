@@ -40,7 +40,7 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
-from robolink.timing import Deadline
+from robolink.timing import AnswerTimes, Deadline
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
 
 if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
@@ -120,6 +120,11 @@ class SoftMotionController(ControllerCore):
     def exchanges(self) -> int:
         """Requests sent so far."""
         return self._mailbox.wire.exchanges
+
+    @property
+    def answers(self) -> AnswerTimes:
+        """How long it takes to answer."""
+        return self._mailbox.wire.answers
 
     def _read_status(self) -> ControllerStatus:
         # Reading the status sends no heartbeat: a movement or jog ends unless somebody waits on it.

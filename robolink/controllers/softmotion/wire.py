@@ -37,7 +37,7 @@ from robolink.messages import tr
 from robolink.package_log import PackageLog
 from robolink.protocols.mailbox import CommandState, Finished, Response
 from robolink.stop_latch import StopLatch
-from robolink.timing import Deadline
+from robolink.timing import AnswerTimes, Deadline
 from robolink.transport import MailboxHead, MailboxLink
 from robolink.transport.byte_stream import link_closed
 
@@ -167,6 +167,7 @@ class MailboxWire:
         latch: Refuses commands while a stop is active.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
+        answers: How long they took to be answered.
         commands: Command blocks among them.
         look_back: Looks over another link at what ended the session; ``None`` before the
             meeting.
@@ -187,6 +188,8 @@ class MailboxWire:
         self.latch = StopLatch(link.identity)
         self.timeout_s = timeout_s
         self.exchanges = self.commands = 0
+        self.answers = AnswerTimes(link.clock)
+        self._moved = False
         self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
 
     @property
@@ -239,8 +242,10 @@ class MailboxWire:
         with self._turn(), self._gate:
             self.exchanges += 1
             self.commands += 1
+            sent_ns = self.clock.now_ns()
             try:
                 self._link.write_command(words)
+                self._note_answer(sent_ns)
                 return
             except (TransportError, RemoteProtocolError) as error:
                 lost = error
@@ -375,7 +380,9 @@ class MailboxWire:
             try:
                 with self._gate:
                     self.exchanges += 1
+                    sent_ns = self.clock.now_ns()
                     found = exchange()
+                    self._note_answer(sent_ns)
                 checkpoint(Checkpoint.EXCHANGE, "read")
                 return found
             except (TransportError, RemoteProtocolError) as error:
@@ -384,6 +391,14 @@ class MailboxWire:
                 if silent or isinstance(error, TransportClosedError):
                     break  # nobody answers, or the link can no longer be used
         raise self._over(lost[0])
+
+    def _note_answer(self, sent_ns: int) -> None:
+        """Note an answer; the two that show the end of a movement are waited for."""
+        moving = self.motions.unfinished
+        self.answers.answered(sent_ns, moving=moving)
+        if self._moved and not moving:
+            self.answers.waited += 2
+        self._moved = moving
 
     def _over(self, error: RobolinkError) -> RobolinkError:
         """End the session because of ``error``, and return the error to report."""

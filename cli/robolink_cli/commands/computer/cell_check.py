@@ -296,6 +296,8 @@ class SensorCheck:
         """
         run = RecipeRun(controller, self.loaded, operator=terminal(), cell=cell, measure_only=True)
         run.preflight()
+        if run.forecast is not None:
+            note(run.forecast.sentence)
         limits = run.plan.limits
         purpose = tr(
             "to measure by the recipe {recipe!r}, without writing", recipe=self.loaded.name

@@ -11,7 +11,7 @@ from robolink.backup import keep_first_backup
 from robolink.calibration import VerifyResult
 from robolink.calibration_run import ChangeReport, Listener, Moment, Proposal, RecipeRun, preview
 from robolink.errors import CalibrationError, DeclinedError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import AnsweredBy, Controller, ToolReceipt, json_fields
 from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, LoadedRecipe, require_answers
@@ -284,7 +284,10 @@ class Recalibration:
             tools=[plan.tool for plan in run.plan.tools],
             takes_reference=run.takes_reference,
             changed_by_others=[change.sentence for change in run.changed],
+            robot_time=_robot_time(run),
         )
+        if run.forecast is not None and not self._at_desk:
+            note(run.forecast.sentence)
 
     def _consent(self, controller: Controller, run: RecipeRun) -> None:
         """Let the person agree to what is about to happen; back up before it does.
@@ -317,6 +320,7 @@ class Recalibration:
             box_mm=run.plan.limits.box.x_max_mm,
             at=self.loaded.recipe.source.of_method.needs.station,
             tools=[plan.tool for plan in run.plan.tools],
+            takes="" if run.forecast is None else run.forecast.sentence,
         )
 
     def _question(self, controller: Controller, run: RecipeRun) -> str:
@@ -376,6 +380,7 @@ class Recalibration:
             "recipe": self.loaded.name,
             "tools": [plan.tool for plan in run.plan.tools],
             "takes_reference": run.takes_reference,
+            "robot_time": _robot_time(run),
             "old_names": list(self.loaded.notes),
             "steps": steps_payload(controller, preview(controller, run.plan)),
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
@@ -402,16 +407,23 @@ class Recalibration:
         took_s = round((clock.now_ns() - began_ns) / NS_PER_S, 1)
         exchanges = controller.exchanges - answered
         document = self._told(controller, run, report)
-        say(
-            tr(
-                "It took {seconds:.1f} s and {exchanges} requests.",
-                seconds=took_s,
-                exchanges=exchanges,
-            )
+        robot_s = None if run.robot_s is None else round(run.robot_s, 1)
+        took = tr(
+            "It took {seconds:.1f} s and {exchanges} requests.", seconds=took_s, exchanges=exchanges
         )
+        if robot_s is not None and robot_s < took_s:
+            of_it = tr("The robot needed {seconds:.1f} s of it.", seconds=robot_s)
+            took = joined(" ", (took, of_it))
+        say(took)
         if order is not None:
             return document
-        return {**document, "took_s": took_s, "exchanges": exchanges}
+        return {
+            **document,
+            "took_s": took_s,
+            "robot_s": robot_s,
+            "exchanges": exchanges,
+            "robot_time": _robot_time(run),
+        }
 
     def _told(
         self, controller: Controller, run: RecipeRun, report: ChangeReport
@@ -446,6 +458,10 @@ class Recalibration:
             "old_names": list(self.loaded.notes),
             "reference_taken": reference_taken,
         }
+
+
+def _robot_time(run: RecipeRun) -> dict[str, object] | None:
+    return None if run.forecast is None else run.forecast.as_json()
 
 
 def _which_is_mounted() -> str:

@@ -1,0 +1,386 @@
+"""How long the robot will take for a recipe, said before it starts.
+
+It comes from the last runs of the same recipe by the same robot: how long the robot worked, and for
+how many answers of its controller it waited, which are counted at the answer time of now. Only the
+way to the start is another one each time: it is calculated from movements of those runs. What no
+run has shown is not guessed: it is left out, and that is said.
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import astuple, dataclass
+from itertools import islice
+from statistics import median
+from typing import TYPE_CHECKING, Final, Self
+
+from robolink.calibration_run._plan import ChangePlan
+from robolink.calibration_run._preview import PlannedStep
+from robolink.errors import DocumentError
+from robolink.messages import joined, tr
+from robolink.model import Controller, EntryKind, NewEntry, Path, Recorded, from_json, to_json
+from robolink.runner import RobotTime, way_between
+
+if TYPE_CHECKING:
+    from robolink.recipe import Recipe
+
+_LAST: Final = 3
+"""Number of recent runs whose median counts."""
+
+_LOOKED_AT: Final = 60
+"""Number of newest runs, of any recipe, among which they are looked for."""
+
+_MOST_MOVES: Final = 60
+"""Largest number of movements that a run records: the last ones."""
+
+_ALIKE: Final = 0.1
+"""Largest part by which the lengths of two like ways differ."""
+
+_ALIKE_MM: Final = 5.0
+"""The same, in mm: another nozzle is measured at another place."""
+
+_ALIKE_DEG: Final = 2.0
+
+_THERE_MM: Final = 0.02
+"""Largest length of a way that takes no time but that of its answers, in mm and degrees."""
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """How much a robot moves in what is foreseen of a run.
+
+    Attributes:
+        moves: How many movements.
+        straight_mm, joint_mm: How far, on straight paths and on others.
+        turn_deg: How far it turns.
+    """
+
+    moves: int = 0
+    straight_mm: float = 0.0
+    joint_mm: float = 0.0
+    turn_deg: float = 0.0
+
+    @classmethod
+    def of(cls, steps: Iterable[PlannedStep]) -> Self:
+        """Return that of foreseen steps.
+
+        Args:
+            steps: The steps.
+        """
+        moves, straight_mm, joint_mm, turn_deg = 0, 0.0, 0.0, 0.0
+        for step in steps:
+            if step.target is None or step.start is None or step.profile is None:
+                continue
+            length_mm, angle_deg = way_between(step.start, step.target)
+            moves, turn_deg = moves + 1, turn_deg + angle_deg
+            if step.profile.path is Path.STRAIGHT:
+                straight_mm += length_mm
+            else:
+                joint_mm += length_mm
+        return cls(moves, straight_mm, joint_mm, turn_deg)
+
+    def is_like(self, other: "Travel") -> bool:
+        """Return whether it differs by no more than another nozzle makes it.
+
+        Args:
+            other: Another run's.
+        """
+        least = (0.0, _ALIKE_MM, _ALIKE_MM, _ALIKE_DEG)
+        pairs = zip(astuple(self), astuple(other), least, strict=True)
+        return self.moves == other.moves and all(
+            abs(a - b) <= max(at_least, _ALIKE * max(a, b)) for a, b, at_least in pairs
+        )
+
+
+Timed = tuple[str, float, float, float]
+"""A movement of a run: its path, how far it went in mm, by how much it turned, how long it took."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunTimes:
+    """How long the robot took in a run, as the journal has it.
+
+    Attributes:
+        work: Digest of what the robot does in it.
+        speed_percent, speed_mm_s: How fast.
+        travel: What was foreseen of it, from its start.
+        robot_s: How long the robot took from its start to its end.
+        answers: For how many answers it waited in that time.
+        answer_s: How long an answer took, ``None`` where nobody knows.
+        move_answers: For how many answers it waited with each movement.
+        moves: The last movements that were measured.
+    """
+
+    work: str
+    speed_percent: int
+    speed_mm_s: float
+    travel: Travel
+    robot_s: float
+    answers: float
+    answer_s: float | None
+    move_answers: float
+    moves: tuple[Timed, ...]
+
+    @classmethod
+    def recorded(cls, entry: Recorded) -> "RunTimes | None":
+        """Return what an entry holds; ``None`` for one of another form.
+
+        Args:
+            entry: The entry.
+        """
+        found = entry.details.get("times")
+        try:
+            return from_json(cls, found) if isinstance(found, dict) else None
+        except DocumentError:
+            return None
+
+    def at(self, answer_s: float | None) -> float:
+        """Return how long the robot takes if the controller answers in another time.
+
+        Args:
+            answer_s: That time; ``None`` for the one of then.
+        """
+        if answer_s is None or self.answer_s is None:
+            return self.robot_s
+        return max(0.0, self.robot_s + self.answers * (answer_s - self.answer_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """How long the robot will take.
+
+    Attributes:
+        about_s: Seconds from its start to its end, with the way to the start where that is known;
+            ``None`` where there is no run like it.
+        straight_s: What its straight movements take alone, as far as they are foreseen.
+        with_journey: Whether the way to the start is in it.
+        runs: How many earlier runs it rests on.
+        changed: Whether there are earlier runs of this recipe, but of another form.
+        answer_s: How long the controller takes to answer; ``None`` where nobody knows.
+    """
+
+    about_s: float | None
+    straight_s: float
+    with_journey: bool
+    runs: int
+    changed: bool
+    answer_s: float | None
+
+    @property
+    def sentence(self) -> str:
+        """The same for a person."""
+        if self.about_s is not None and self.with_journey:
+            return tr(
+                "The robot needs about {seconds} s, not counting what you do yourself.",
+                seconds=_rounded(self.about_s),
+            )
+        if self.about_s is not None:
+            return tr(
+                "The robot needs about {seconds} s, not counting its move to the start and what "
+                "you do yourself.",
+                seconds=_rounded(self.about_s),
+            )
+        if self.changed:
+            unknown = tr(
+                "How long the robot needs is not known: the recipe, its speeds or its places have "
+                "changed since the last run."
+            )
+        else:
+            unknown = tr("How long the robot needs is not known before its first run.")
+        if self.straight_s < _SHORTEST_S:
+            return unknown
+        least = tr("Its straight moves alone take {seconds} s.", seconds=_rounded(self.straight_s))
+        return joined(" ", (unknown, least))
+
+    def as_json(self) -> dict[str, object]:
+        """Return it for a program."""
+        about_s, answer_s = self.about_s, self.answer_s
+        return {
+            "about_s": None if about_s is None else round(about_s, 1),
+            "straight_moves_s": round(self.straight_s, 1),
+            "with_move_to_start": self.with_journey,
+            "earlier_runs": self.runs,
+            "changed": self.changed,
+            "answer_ms": None if answer_s is None else round(answer_s * 1000, 1),
+        }
+
+
+def _rounded(seconds: float) -> str:
+    return f"{seconds:.0f}" if seconds >= _WHOLE_FROM_S else f"{seconds:.1f}"
+
+
+@dataclass(frozen=True, slots=True)
+class RunForecaster:
+    """Foresees a run from earlier ones, and records it for later ones.
+
+    Args:
+        controller: The controller; its record is read, and nothing is asked.
+        recipe: Name of the recipe.
+        work: Digest of what the robot does; see :func:`work_digest`.
+        plan: The plan.
+        steps: The foreseen steps of the measurement.
+    """
+
+    controller: Controller
+    recipe: str
+    work: str
+    plan: ChangePlan
+    steps: Sequence[PlannedStep]
+
+    def forecast(self) -> Forecast | None:
+        """Return how long the robot will take; ``None`` where nothing moves.
+
+        Raises:
+            JournalError: The record cannot be read.
+        """
+        if not self.plan.moves:
+            return None
+        answers = self.controller.answers
+        answer_s = answers.median_s if answers else None
+        runs = list(islice(self.controller.outcomes.recorded(kinds=(EntryKind.RUN,)), _LOOKED_AT))
+        named = [(one.signature.recipe, RunTimes.recorded(one)) for one in runs]
+        known = [(name, times) for name, times in named if times is not None]
+        journey, work = self._parts()
+        travel = Travel.of(work)
+        alike = [one for _, one in known if one.work == self.work and one.travel.is_like(travel)]
+        about_s, with_journey = None, False
+        if last := alike[:_LAST]:
+            about_s = median(one.at(answer_s) for one in last)
+            journey_s = self._journey_s(journey, [one for _, one in known], last[0], answer_s)
+            with_journey = journey_s is not None
+            about_s += journey_s or 0.0
+        return Forecast(
+            about_s,
+            Travel.of(one for one in self.steps if one.edge is None).straight_mm
+            / self.plan.limits.speed_mm_s,
+            with_journey,
+            len(last),
+            not last and any(name == self.recipe for name, _ in known),
+            answer_s,
+        )
+
+    def entry(self, time: RobotTime, change: str) -> NewEntry | None:
+        """Return the record of a run that has ended well; ``None`` for one that tells nothing.
+
+        Args:
+            time: How long it took.
+            change: Id of the change.
+        """
+        if not (self.plan.moves and time.usual):
+            return None
+        answers, limits = self.controller.answers, self.plan.limits
+        times = RunTimes(
+            self.work,
+            limits.speed_percent,
+            limits.speed_mm_s,
+            Travel.of(self._parts()[1]),
+            round(time.work.seconds, 3),
+            round(time.work.answers, 1),
+            answers.median_s if answers else None,
+            round((time.journey.answers + time.work.answers) / max(1, time.movements), 2),
+            tuple(
+                (
+                    str(one.path),
+                    round(one.length_mm, 2),
+                    round(one.turn_deg, 2),
+                    round(one.seconds, 3),
+                )
+                for one in time.moves[-_MOST_MOVES:]
+            ),
+        )
+        return NewEntry(
+            EntryKind.RUN,
+            change=change,
+            verdict=tr("the robot took {seconds} s", seconds=_rounded(time.seconds)),
+            details={"times": to_json(times)},
+        )
+
+    def _parts(self) -> tuple[Sequence[PlannedStep], Sequence[PlannedStep]]:
+        """Return the steps of the way to the start, and those from there on."""
+        start, steps = self.plan.start, self.steps
+        first = next((one.start for one in steps if one.start is not None), None)
+        if start is None or first is None or first.coordinates() == start.coordinates():
+            return (), steps
+        ends = next((k for k, one in enumerate(steps, start=1) if one.target_is(start)), 0)
+        return steps[:ends], steps[ends:]
+
+    def _journey_s(
+        self,
+        journey: Sequence[PlannedStep],
+        runs: Sequence[RunTimes],
+        last: RunTimes,
+        answer_s: float | None,
+    ) -> float | None:
+        """Return how long the way to the start takes; ``None`` where nobody knows."""
+        limits = self.plan.limits
+        speeds = limits.speed_percent, limits.speed_mm_s
+        moves = [
+            move
+            for one in runs
+            if (one.speed_percent, one.speed_mm_s) == speeds
+            for move in one.moves
+        ]
+        whole_s = 0.0
+        for step in journey:
+            seconds = _move_s(step, moves, limits.speed_mm_s)
+            if seconds is None:
+                return None
+            whole_s += seconds + last.move_answers * (answer_s or 0.0)
+        return whole_s
+
+
+def _move_s(step: PlannedStep, moves: Sequence[Timed], speed_mm_s: float) -> float | None:
+    """Return how long a movement takes, from others of the same robot at the same speeds."""
+    if step.target is None or step.start is None or step.profile is None:
+        return 0.0
+    length_mm, turn_deg = way_between(step.start, step.target)
+    path = step.profile.path
+    own = [(mm, deg, seconds) for of, mm, deg, seconds in moves if of == path]
+    lengths = [(mm, seconds) for mm, deg, seconds in own if deg <= _ALIKE_DEG]
+    turns = [(deg, seconds) for _, deg, seconds in own if deg > _ALIKE_DEG]
+    along_s = _between(lengths, length_mm, _ALIKE_MM)
+    if along_s is None and path is Path.STRAIGHT and lengths:
+        longest_mm, seconds = max(lengths)
+        along_s = seconds + (length_mm - longest_mm) / speed_mm_s
+    around_s = _between(turns, turn_deg, _ALIKE_DEG)
+    return None if along_s is None or around_s is None else max(along_s, around_s)
+
+
+def _between(points: Iterable[tuple[float, float]], at: float, alike: float) -> float | None:
+    """Return the seconds at a size between those of two known ones; ``None`` beyond all."""
+    if at <= _THERE_MM:
+        return 0.0
+    below, below_s = 0.0, 0.0
+    for size, seconds in sorted(points):
+        if size >= at:
+            return below_s + (seconds - below_s) * (at - below) / (size - below)
+        below, below_s = size, seconds
+    return below_s if at - below <= max(alike, _ALIKE * at) and below else None
+
+
+def work_digest(recipe: "Recipe", plan: ChangePlan, *, version: str, more: str) -> str:
+    """Return what tells two runs apart whose robot does not do the same.
+
+    Args:
+        recipe: The recipe, as its file has it.
+        plan: The plan.
+        version: Version of robolink: another one may move differently.
+        more: What else it depends on.
+    """
+    said = [f"{name}={getattr(recipe, name)!r}" for name in sorted(_moves(recipe))]
+    said += [version, more, f"{plan.limits.speed_percent} {plan.limits.speed_mm_s:g}"]
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:16]
+
+
+def _moves(recipe: "Recipe") -> Iterator[str]:
+    """Yield the fields of a recipe that say what the robot does."""
+    yield from (name for name in type(recipe).model_fields if name not in _FOR_PEOPLE)
+
+
+_FOR_PEOPLE: Final = frozenset({"name", "notes", "cells", "numbers", "accuracy", "prompts"})
+"""Fields of a recipe that only people read, or that only judge."""
+
+_WHOLE_FROM_S: Final = 9.95
+"""Seconds from which they are shown without a decimal."""
+
+_SHORTEST_S: Final = 0.5
+"""Shortest time of the straight moves that is worth a sentence, in s."""

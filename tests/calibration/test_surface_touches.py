@@ -300,6 +300,7 @@ def test_from_the_values_one_touch_is_made_again_in_its_place_and_tilt(kind, aga
     assert math.dist(person.touches[-1].coordinates(), person.touches[again].coordinates()) < 2.0
     kept = [touch for number, touch in enumerate(before.inputs) if number != again]
     assert [touch for number, touch in enumerate(result.inputs) if number != again] == kept
+    assert all(subject.retakes for subject in person.asks), "and any of them once more"
     assert result.inputs[again].arrival is not None, "made from a standoff, the first one too"
     if again < UPRIGHTS[kind]:
         # It may be the one that the others contradict, so the surface counts as unknown.

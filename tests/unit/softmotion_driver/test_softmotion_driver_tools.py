@@ -450,3 +450,9 @@ def test_a_slot_in_another_word_order_is_neither_told_nor_recorded(cell, control
     assert list(cell.outcomes.recorded(tool=3)) == before
     with pytest.raises(TransportClosedError):
         controller.tools.read(3)
+
+
+@pytest.mark.parametrize(("apart_mm", "same"), [(0.9e-9, True), (1.2e-9, False)])
+def test_offsets_within_a_billionth_are_one_value_to_a_plc(controller, apart_mm, same):
+    """LREALs that differ by more were not written by one command (docs/reference/rules.md 3)."""
+    assert controller.tools.same(ToolOffset(), ToolOffset(x_mm=apart_mm)) is same

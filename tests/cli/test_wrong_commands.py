@@ -260,6 +260,12 @@ def test_the_table_of_answers_is_the_one_that_was_looked_over(found):
     )
 
 
+def test_an_option_of_a_former_name_has_no_line_of_help_and_needs_its_value(state_folder):
+    ended = run_command("sim", "plc", "--modbus-tcp")
+    assert ended.code == 2
+    assert ended.err.startswith("robolink: --modbus-tcp needs a value.\n")
+
+
 @pytest.mark.parametrize(
     ("words", "template"),
     [

@@ -24,7 +24,11 @@ from robolink_cli.options.shared import json_option
 def scan(
     *,
     addresses: Annotated[str | None, CliArgument(metavar="[RANGE]")] = None,
-    port: Annotated[int, click.IntRange(1, 65535), CliOption()] = 5000,
+    port: Annotated[
+        int,
+        click.IntRange(1, 65535),
+        CliOption(help="TCP port to try; 5000 is that of EPSON Remote Ethernet."),
+    ] = 5000,
     timeout_s: Annotated[
         float,
         NumberInside(min=0.05, max=10),

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Self
 
 from annotated_types import Ge, Le, MaxLen, MinLen
@@ -56,6 +56,8 @@ if TYPE_CHECKING:
 
 
 _SAME_ANGLE_DEG: Final = 1e-9
+
+_HALF_DEG: Final = 180.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,6 +137,39 @@ def most_informative_order(turns_deg: Sequence[float]) -> tuple[float, ...]:
         left.remove(best)
         chosen.append(best)
     return tuple(chosen[1:])
+
+
+def within_half_a_turn(first_deg: float, turns_deg: Sequence[float]) -> list[list[float]]:
+    """Return U after each turn, within half a turn of zero; the order that turns least comes first.
+
+    Angles added up from touch to touch could leave the joint's range. Half a turn itself can be
+    either 180 or -180: one of them may be nearer to the angles before and after it, and an arm may
+    reach only the other.
+
+    Args:
+        first_deg: U of the first touch.
+        turns_deg: Turns of the others, counted from it.
+
+    Example:
+        >>> from robolink.methods.n_angle import within_half_a_turn
+        >>> within_half_a_turn(0, (180, 90, 270))
+        [[180.0, 90.0, -90.0], [-180.0, 90.0, -90.0]]
+    """
+    plain = [angle_difference_deg(first_deg + turn_deg, 0.0) for turn_deg in turns_deg]
+    halves = [
+        number for number, u in enumerate(plain) if abs(abs(u) - _HALF_DEG) <= _SAME_ANGLE_DEG
+    ]
+    if not halves:
+        return [plain]
+    # Two turns with the same remainder are refused as the same angle, so it is one at most.
+    found = [
+        [*plain[: halves[0]], half, *plain[halves[0] + 1 :]] for half in (-_HALF_DEG, _HALF_DEG)
+    ]
+    return sorted(found, key=lambda angles: _turned_deg([first_deg, *angles]))
+
+
+def _turned_deg(angles_deg: Sequence[float]) -> float:
+    return round(sum(abs(b - a) for a, b in pairwise(angles_deg)), 6)
 
 
 def gain_of_turns(turns_deg: Sequence[float]) -> float:
@@ -272,14 +307,12 @@ class NAngleSource(ManualPinSource):
         first = yield from touches.first()
         # Refused before anything turns, not after all touches.
         solvable_planes([first], height_of(stored))
-        # Within half a turn of zero: angles added up from touch to touch could leave the joint's
-        # range.
         choice = [
-            [
-                angle_difference_deg(first.u_deg + turn_deg * share, 0.0)
-                for turn_deg in self.turns_deg
-            ]
+            angles_deg
             for share in _SHARES
+            for angles_deg in within_half_a_turn(
+                first.u_deg, [turn_deg * share for turn_deg in self.turns_deg]
+            )
         ]
         nominal = replace(self.touch, nominal=True)
         angles = yield from first_clear(

@@ -21,6 +21,7 @@ from robolink.calibration import (
 from robolink.calibration.core.statistics import student_t95
 from robolink.errors import CalibrationError, ConfigError
 from robolink.methods import measure_n_angle, most_informative_order
+from robolink.methods.n_angle import within_half_a_turn
 from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink.procedures import SamplingPolicy, TouchPlan, finalize_samples
 from robolink.runner import Ask, Confirm, Consider, Move, Notify
@@ -229,7 +230,7 @@ class Person:
                     case Move():
                         here = answer = step.target
                     case Consider():
-                        answer = ("",) * len(step.moves)
+                        answer = self.obstacles(step)
                     case Notify():
                         self.told.append(step.text)
                         answer = None
@@ -239,6 +240,10 @@ class Person:
                 step = procedure.send(answer)
         except StopIteration as finished:
             return finished.value
+
+    def obstacles(self, step):
+        """Return why the arm cannot make each movement."""
+        return ("",) * len(step.moves)
 
     def _touch(self, u_deg):
         self.touches += 1
@@ -404,3 +409,27 @@ def test_of_two_that_check_each_other_it_is_the_other_s_turn():
             offered += [step.question[:7]] if answer else []
     assert offered == ["Touch 1", "Touch 2", "Touch 1"]
     assert pair.taken_at == [0, 10, 0]
+
+
+def travelled(person, **how):
+    """Return U of each touch of four, as the robot turned to it."""
+    return [pose.u_deg for pose in course(person, turns_deg=(180.0, 90.0, 270.0), **how).inputs]
+
+
+def test_half_a_turn_is_made_to_the_side_from_which_the_next_touch_is_near():
+    # To -180 it would be 630 degrees in all.
+    assert travelled(Person()) == [0.0, 180.0, 90.0, -90.0]
+    assert within_half_a_turn(-90.0, (180.0, 90.0, 270.0))[0] == [90.0, 0.0, -180.0]
+    assert within_half_a_turn(90.0, (180.0, 270.0, 90.0))[0] == [-90.0, 0.0, -180.0]
+    assert within_half_a_turn(10.0, (120.0, 240.0)) == [[130.0, -110.0]]
+
+
+class ShortOfHalfATurn(Person):
+    """Uses an arm that cannot turn to 180 degrees, only to -180."""
+
+    def obstacles(self, step):
+        return tuple("402" if move.target.u_deg > 170.0 else "" for move in step.moves)
+
+
+def test_an_arm_that_cannot_make_it_to_that_side_makes_it_to_the_other():
+    assert travelled(ShortOfHalfATurn()) == [0.0, -180.0, 90.0, -90.0]

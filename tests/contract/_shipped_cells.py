@@ -14,7 +14,8 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.testkit.media import served
 
-from robolink.model import ToolOffset
+from robolink.model import Pose, ToolOffset
+from robolink.runner._place_question import PlaceQuestion
 from tests._commands import Ended, run_command
 from tests.contract._camera_cell import cell_of, furnish
 from tests.contract._sensor_cell import sensor_cell
@@ -120,6 +121,26 @@ CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
     "sphere": lambda: _on_a_plc("sphere.toml", "Kin_5Axes", 4, "sphere"),
 }
 """The cell of each shipped recipe that moves a robot; by ``pendant-points`` nothing moves."""
+
+
+@contextmanager
+def seconds_of_touches() -> Iterator[Callable[[], float]]:
+    """Count the time in which a person is asked for a touch, until they have made it; jogs too."""
+    answer, spent_ns = PlaceQuestion.answer, [0]
+
+    def counted(question: PlaceQuestion) -> Pose:
+        clock = question._controller.clock
+        began_ns = clock.now_ns()
+        try:
+            return answer(question)
+        finally:
+            spent_ns[0] += clock.now_ns() - began_ns
+
+    PlaceQuestion.answer = counted  # type: ignore[method-assign]
+    try:
+        yield lambda: spent_ns[0] / 1e9
+    finally:
+        PlaceQuestion.answer = answer  # type: ignore[method-assign]
 
 
 @contextmanager

@@ -2,43 +2,44 @@
 
 python -m tests.contract.robot_time [RECIPE ...]
 
-Each is carried out in simulated time, with its turn test; what the simulated person needs is in it.
-Where a person touches, the stop above the pin is drawn anew each time, so the seconds scatter: the
-median of a few runs is printed.
+Each is carried out in simulated time, with its turn test; what the simulated person needs is in it,
+and the robot's own part is printed apart. Where a person touches, the stop above the pin is drawn
+anew each time, so the seconds scatter: the median of a few runs is printed.
 """
 
 import sys
 from statistics import median
 from typing import Final
 
-from tests.contract._shipped_cells import CELLS, shipped_cell
+from tests.contract._shipped_cells import CELLS, seconds_of_touches, shipped_cell
 
 ANSWERS_MS: Final = (0, 5, 20, 50)
 RUNS: Final = 3
 
 
-def measured(name: str, answer_ms: float) -> tuple[float, int]:
-    """Return the seconds and the requests of one change by a shipped recipe."""
-    with shipped_cell(name, answer_ms) as cell:
+def measured(name: str, answer_ms: float) -> tuple[float, int, float]:
+    """Return the seconds, the requests and the robot's own seconds of a change by a recipe."""
+    with shipped_cell(name, answer_ms) as cell, seconds_of_touches() as touching_s:
         done = cell.change(*cell.words)
         if done.code:
             sys.exit(f"{name} at {answer_ms} ms: exit code {done.code}\n{done.err}")
         document = done.document
-        return document["took_s"], document["exchanges"]
+        return document["took_s"], document["exchanges"], document["took_s"] - touching_s()
 
 
 def main(names: list[str]) -> None:
     """Print the table."""
     heads = " | ".join(f"{answer_ms} ms" for answer_ms in ANSWERS_MS)
-    _show(f"| recipe | requests at 0 ms, at 20 ms | {heads} |")
-    _show(f"|---|---:|{'---:|' * len(ANSWERS_MS)}")
+    _show(f"| recipe | requests at 0 ms, at 20 ms | {heads} | the robot at 0 ms |")
+    _show(f"|---|---:|{'---:|' * len(ANSWERS_MS)}---:|")
     for name in names or CELLS:
         found = {
             answer_ms: [measured(name, answer_ms) for _ in range(RUNS)] for answer_ms in ANSWERS_MS
         }
-        took = " | ".join(f"{median(s for s, _ in runs):.1f} s" for runs in found.values())
-        asked = ", ".join(f"{median(n for _, n in found[answer_ms]):,}" for answer_ms in (0, 20))
-        _show(f"| `{name}` | {asked} | {took} |")
+        took = " | ".join(f"{median(run[0] for run in runs):.1f} s" for runs in found.values())
+        asked = ", ".join(f"{median(run[1] for run in found[ms]):,}" for ms in (0, 20))
+        robot_s = median(run[2] for run in found[0])
+        _show(f"| `{name}` | {asked} | {took} | {robot_s:.1f} s |")
 
 
 def _show(line: str) -> None:

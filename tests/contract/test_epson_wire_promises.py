@@ -42,7 +42,7 @@ def log_of(folder, monkeypatch, example, comma="numeric"):
 )
 def test_every_movement_of_a_recipe_is_proved(tmp_path, monkeypatch, example, comma):
     log = log_of(tmp_path, monkeypatch, example, comma)
-    assert movements(log) > 30
+    assert movements(log) > 25
     assert broken_promises(log, SPEEDS[example]) == []
     requests = sum(direction == ">" for _, direction, _ in log)
     assert comma == "nothing" or requests <= MOST_REQUESTS.get(example, requests)

@@ -15,15 +15,22 @@ from robolink_simulators.cell.tip_switches import LightBeam
 from robolink.model import ToolOffset
 from robolink.recipe import load_recipe
 from tests.contract._sensor_cell import sensor_cell
+from tests.contract._shipped_cells import seconds_of_touches
 
 pytestmark = pytest.mark.simulator_only
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
 BEAMS_MM = (175.0, 488.0, -106.0)
-MOST_S = {"needle-beams": 10.0}
-"""The promised time. It is counted by the simulated clock, which only movements advance here, so it
-is the same in each run and on each machine: 9.87 s.
+MOST_S = {"needle-beams": 10.0, "scara-pin": 12.0, "two-nozzles": 30.0}
+"""The promised time of the robot, without that of the person who touches.
+
+It is counted by the simulated clock, which only movements advance here: 9.87 s with beams in each
+run and on each machine. Above a pin the robot stops where a draw says: 11.6 and 29.5 s, 0.1 or 0.3
+more or less.
 """
+
+ENDS_TURNED_DEG = {"needle-beams": 90.0, "two-nozzles": -90.0}
+"""U after a recipe that does not turn back, from its safe pose."""
 
 
 @pytest.fixture
@@ -43,14 +50,18 @@ def cell(tmp_path, monkeypatch):
 def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, example, capsys):
     words = ("recalibrate", str(EXAMPLES / f"{example}.toml"), "--assist", cell.url)
     began_ns = cell.clock.now_ns()
-    code = main.run(["-c", cell.url, *words, "--nozzle", "N-7", "--lot", "L", "--yes", "--json"])
+    run = ("--nozzle", "N-7", "--lot", "L", "--yes", "--json")
+    with seconds_of_touches() as touching_s:
+        code = main.run(["-c", cell.url, *words, *run])
     took_s = (cell.clock.now_ns() - began_ns) / 1e9
+    robot_s = took_s - touching_s()
     asked = cell.simulator.exchanges
     shown = capsys.readouterr()
     assert code == 0, shown.err
     with capsys.disabled():
-        sys.stdout.write(f"\n{example} recipe, with proof: {took_s:.1f} s of robot time\n")
-    assert took_s < MOST_S.get(example, took_s + 1)
+        sys.stdout.write(f"\n{example} recipe, with proof: {robot_s:.1f} s of robot time\n")
+    assert robot_s < MOST_S[example]
+    assert (robot_s < took_s - 1.0) is (example != "needle-beams")
     document = json.loads(shown.out)
     assert document["took_s"] == pytest.approx(took_s, abs=0.2)
     assert asked - 40 < document["exchanges"] < asked  # without connecting and logging out
@@ -59,7 +70,7 @@ def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, examp
     if poses.safe is not None:
         told = poses.safe.pose.coordinates()[:3]
         assert stands.coordinates()[:3] == pytest.approx(told, abs=0.01)
-        turned_deg = 0.0 if poses.turn_back else 90.0
+        turned_deg = 0.0 if poses.turn_back else ENDS_TURNED_DEG[example]
         assert stands.u_deg == pytest.approx(poses.safe.u_deg + turned_deg, abs=0.01)
     for tool in document["tools"]:
         number, halves = tool["tool"], tool["fit"]["half_width95"]

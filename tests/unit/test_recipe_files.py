@@ -194,7 +194,7 @@ def test_an_output_can_be_switched_at_every_moment_of_a_nozzle_change():
 def test_a_pose_of_the_flange_is_a_pose_in_tool_0():
     pose = load_recipe(example("scara-pin")).recipe.poses.safe
     assert pose is not None
-    assert pose.pose.coordinates() == (158.6, 495.4, -40.0, 0.0, 0.0, 0.0)
+    assert pose.pose.coordinates() == (158.6, 495.4, -64.0, 0.0, 0.0, 0.0)
     assert pose.pose.tool == 0
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import ClassVar
 
 from robolink.calibration import flange_of
 from robolink.calibration_run._plan import (
@@ -56,6 +57,7 @@ class PlannedStep:
         start: Where the flange is before a movement; behind a touch, where that is expected.
     """
 
+    json_version: ClassVar[int] = 2
     text: str
     target: Pose | None = None
     profile: MotionProfile | None = None

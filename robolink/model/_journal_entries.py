@@ -9,7 +9,7 @@ option or ``--yes``, is kept with the question that it answered.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from robolink.messages import tr
 
@@ -74,6 +74,7 @@ class NewEntry:
         details: Plain JSON values.
     """
 
+    json_version: ClassVar[int] = 2
     kind: EntryKind
     change: str = ""
     operation: str = ""
@@ -132,6 +133,7 @@ class Recorded:
         hash: SHA-256 of all other fields.
     """
 
+    json_version: ClassVar[int] = 2
     number: int
     at: str
     controller: str

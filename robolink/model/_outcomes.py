@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from robolink import runtime
 from robolink.errors import ConfigError
@@ -243,6 +243,7 @@ class Finding:
         entries: What recovering it records.
     """
 
+    json_version: ClassVar[int] = 2
     marker: Marker
     verdict: Verdict
     sentence: str

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, ClassVar
 
 from robolink.calibration import CalibrationResult, Impact, VerifyResult
 from robolink.model import ControllerFacts, Pose, Recorded, Signature, ToolOffset
@@ -103,6 +103,7 @@ class Record:
         problems: What is wrong with the journal, one sentence each.
     """
 
+    json_version: ClassVar[int] = 2
     change: str
     signature: Signature
     people: tuple[str, ...]
@@ -149,6 +150,7 @@ class Report:
             nothing says so.
     """
 
+    json_version: ClassVar[int] = 2
     made_at: str
     robolink_version: str
     controller: str

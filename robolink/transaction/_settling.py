@@ -7,7 +7,7 @@ and so one write per tool is the most that ever takes effect.
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import ClassVar, Final
 
 from robolink.errors import (
     ConfigError,
@@ -327,6 +327,7 @@ class Recovery:
         left: What takes a person's word, and did not get it.
     """
 
+    json_version: ClassVar[int] = 2
     settled: tuple[Finding, ...]
     left: tuple[Finding, ...]
 

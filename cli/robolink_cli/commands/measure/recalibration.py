@@ -408,13 +408,7 @@ class Recalibration:
         exchanges = controller.exchanges - answered
         document = self._told(controller, run, report)
         robot_s = None if run.robot_s is None else round(run.robot_s, 1)
-        took = tr(
-            "It took {seconds:.1f} s and {exchanges} requests.", seconds=took_s, exchanges=exchanges
-        )
-        if robot_s is not None and robot_s < took_s:
-            of_it = tr("The robot needed {seconds:.1f} s of it.", seconds=robot_s)
-            took = joined(" ", (took, of_it))
-        say(took)
+        say(_took(took_s, robot_s, exchanges))
         if order is not None:
             return document
         return {
@@ -458,6 +452,16 @@ class Recalibration:
             "old_names": list(self.loaded.notes),
             "reference_taken": reference_taken,
         }
+
+
+def _took(seconds: float, robot_s: float | None, exchanges: int) -> str:
+    """Return how long a run took, and how long of it the robot needed if a person did the rest."""
+    took = tr(
+        "It took {seconds:.1f} s and {exchanges} requests.", seconds=seconds, exchanges=exchanges
+    )
+    if robot_s is None or robot_s >= seconds:
+        return took
+    return joined(" ", (took, tr("The robot needed {seconds:.1f} s of it.", seconds=robot_s)))
 
 
 def _robot_time(run: RecipeRun) -> dict[str, object] | None:

@@ -30,6 +30,7 @@ from robolink_simulators.epson.spel.parser import (
 )
 from robolink_simulators.epson.spel.programs.text_statements import FUNCTIONS_OF_ARRAYS
 from robolink_simulators.epson.spel.tasks.task_functions import TASK_FUNCTIONS
+from robolink_simulators.epson.spel.tree import Print
 
 from robolink.errors import ConfigError, LocalProtocolError
 from robolink.model import Hand, Pose, ToolOffset
@@ -289,12 +290,14 @@ def test_a_filled_line_is_the_line_that_was_read(line):
 
 
 def test_a_question_with_another_number_is_not_read_anew():
-    parse("Print Tool, Speed(1), 1")
+    (first,) = parse("Print Tool, Speed(1), 1")
+    assert isinstance(first, Print)
     known = _shape.cache_info().misses
     for number in range(10, 100):
         (asked,) = parse(f"Print Tool, Speed(1), {number}")
+        assert isinstance(asked, Print)
         assert repr(asked.items[-1]) == f"Literal(value={number})"
-        assert asked.items[0] is parse("Print Tool, Speed(1), 1")[0].items[0]
+        assert asked.items[0] is first.items[0]
     assert _shape.cache_info().misses == known
 
 

@@ -345,8 +345,8 @@ class DrivenRobot:
 
     def point_at(self, pose: Pose) -> Point:
         """Return the point of a pose that the robot sees, as its base sees it."""
-        at = Point.at(pose)
-        return replace(at, coordinates=self.kept.base.to_base(at.coordinates))
+        at, base = Point.at(pose), self.kept.base
+        return replace(at, coordinates=base.to_base(at.coordinates)) if base.moved else at
 
     def here(self) -> Point:
         """Return the commanded place of the selected tool's tip."""

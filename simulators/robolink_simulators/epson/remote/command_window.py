@@ -45,7 +45,7 @@ class SpelWindow:
             return
         self._aborted = False
         self._running = (self._interpreter.start(statement, now_ns), exchange)
-        self.advance(now_ns)
+        self._settle()
 
     def advance(self, now_ns: int) -> None:
         """Continue the statement until ``now_ns``."""

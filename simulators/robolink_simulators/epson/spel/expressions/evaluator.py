@@ -10,7 +10,13 @@ from robolink_simulators.epson.arm.coordinate_systems import coordinates_of_fram
 from robolink_simulators.epson.arm.kinematics import PLAIN
 from robolink_simulators.epson.condition import RefusalKind, RequestRefused, SpelRefusal
 from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
-from robolink_simulators.epson.spel.expressions.closures import Run, Scope, check_count, closure
+from robolink_simulators.epson.spel.expressions.closures import (
+    Run,
+    Scope,
+    check_count,
+    closure,
+    unary,
+)
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     printed_pulses,
     require_singular_angle,
@@ -27,6 +33,7 @@ from robolink_simulators.epson.spel.expressions.values import (
     as_integer,
     as_number,
     as_point,
+    checked,
     out_of_range,
 )
 from robolink_simulators.epson.spel.session import Session
@@ -36,12 +43,14 @@ from robolink_simulators.epson.spel.tree import (
     Coordinates,
     Expression,
     LabelledPoint,
+    Literal,
     Modifier,
     ModifierKind,
     Name,
     PointExpression,
     PointFunction,
     StoredPoint,
+    Unary,
 )
 
 FARTHEST: Final = 1e9
@@ -98,10 +107,18 @@ class Evaluator:
     def value(self, expression: Expression) -> Value:
         """Return the present value of an expression.
 
+        Each line brings numbers of its own, so no function is made and stored for them.
+
         Raises:
             Refusal: It cannot be evaluated.
         """
-        return self.closure(expression)(self)
+        match expression:
+            case Literal(value):
+                return checked(value)
+            case Unary(sign, Literal(value)):
+                return unary(sign, checked(value))
+            case _:
+                return self.closure(expression)(self)
 
     def write_to(self, channel: int, text: str, *, ends: bool) -> None:  # noqa: ARG002
         """Print to a port.
@@ -273,7 +290,8 @@ def _flagged(point: Point, word: str) -> Point:
     if word in _HANDS:
         return replace(point, hand=_HANDS[word])
     if word.isdigit():
-        return replace(point, local=_local_number(word))
+        number = _local_number(word)
+        return point if number == point.local else replace(point, local=number)
     # A SCARA has none of them; it keeps them without effect (assumed).
     posture = point.posture or PLAIN
     if word in _ELBOWS:

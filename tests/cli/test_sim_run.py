@@ -322,7 +322,8 @@ def test_a_port_that_is_taken_ends_it_all_by_the_name_of_the_cell(file, tmp_path
         for how in ((), ("--wait-ready",)):
             done = started(path, *how, folder=tmp_path)
             assert (done.returncode, done.stdout) == (3, "")
-            assert "b: The simulator cannot listen on 127.0.0.1" in done.stderr
+            assert "The simulated cell b cannot run:\n" in done.stderr
+            assert "    The simulator cannot listen on 127.0.0.1" in done.stderr
             assert [one.name for one in tmp_path.iterdir()] == [path.name]
 
 

@@ -117,6 +117,9 @@ MEASURES = (crossing, touching, looking, a_board, a_recipe)
 ADAPTS = {("shoulder", touching), ("shoulder", a_recipe), ("elbow under a ceiling", a_recipe)}
 """With vertical moves and other tilts the arm can measure there."""
 
+TURNS_TOO_FAR = {("elbow", crossing), ("elbow under a ceiling", crossing)}
+"""The arm can measure there, and cannot turn the tool as far as the test of the new tip asks."""
+
 QUICK = {("wrist", looking), ("elbow", touching), ("shoulder", crossing), ("wrist", a_recipe)}
 
 
@@ -133,7 +136,7 @@ def cases():
         )
         for place, (robot, joints, why) in PLACES.items()
         for measure in MEASURES
-        if (place, measure) not in ADAPTS
+        if (place, measure) not in ADAPTS | TURNS_TOO_FAR
     ]
 
 
@@ -141,6 +144,24 @@ def cases():
 def test_a_station_near_a_singular_place_is_refused_before_anything_moves(at, measure, joints, why):
     stand(at, joints)
     assert re.search(why, refused(at, measure(at)))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    ("at", "joints"),
+    [PLACES[place][:2] for place, _ in sorted(TURNS_TOO_FAR, key=str)],
+    indirect=["at"],
+)
+def test_where_the_turn_test_is_out_of_reach_the_old_value_comes_back(at, joints):
+    stand(at, joints)
+    before = at.cell.simulator.machine.tools.get(1)
+    done = crossing(at)
+    assert done.code == 2, done.out + done.err
+    error = json.loads(done.out)["error"]
+    assert "cannot reach" in error["what"]
+    assert "The old value of tool 1 is back." in error["what"]
+    assert error["stands"]["settled"]
+    assert at.cell.simulator.machine.tools.get(1) == before
 
 
 FAR_OUT = (0.0, -68.483, 43.963, 0.0, -65.48, 0.0)

@@ -40,14 +40,14 @@ def simulator_with(action, match):
     return EpsonSimulator(seed=5, faults=[Fault(action, on_exchange=0, match=match)])
 
 
-def lift(controller, dz_mm=5.0):
+def lift(controller, dz_mm=5.0, speed_mm_s=20.0):
     if controller.outcomes.open_markers() == ():
         controller.motors(True)
     group = controller.groups[0]
     here = group.pose()
     return group.move_to(
         replace(here, z_mm=here.z_mm + dz_mm),
-        MotionProfile(Path.STRAIGHT, 5, 20.0),
+        MotionProfile(Path.STRAIGHT, 5, speed_mm_s),
         box=WorkBox(),
     )
 
@@ -99,6 +99,35 @@ def test_f25_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice
             assert finding.verdict is Verdict.LOOK
             controller.resolver.settle(finding)
             lift(controller).wait(timeout_s=60)
+
+
+def test_flags_that_cannot_be_read_end_a_movement_and_leave_no_doubt_about_it(serve):
+    """The link answers on, so the end is seen; nothing is left for anybody to look at."""
+    simulator, fault = with_unreadable_flags()
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        moving = lift(controller, 40.0, speed_mm_s=1.0)
+        simulator.faults.add(fault)
+        with pytest.raises(RemoteProtocolError, match="is not a status") as told:
+            moving.wait(timeout_s=60)
+        assert not simulator.faults.pending
+        assert controller.outcomes.open_markers() == ()
+        assert outcome_after(told.value).settled
+        assert not simulator.status_flags().running
+        lift(controller, 1.0).wait(timeout_s=60)
+    assert simulator.machine.arm.moves_started == 2
+    assert len([text for _, way, text in simulator.log if way == ">" and "Abort" in text]) == 1
+
+
+def with_unreadable_flags():
+    """Return a simulator, and a fault that puts a letter into the code of its next GetStatus."""
+    fault = Fault(FaultAction.GARBLE_REPLY, match="GetStatus", position=24)
+    for seed in range(200):
+        plan = FaultPlan(seed=seed)
+        ((_, bent),) = plan.departures(b"#GetStatus,00100000010,0000\r\n", [fault])
+        assert isinstance(bent, bytes)
+        if bent[24:25].isalpha():
+            return EpsonSimulator(seed=seed), fault
+    raise AssertionError("no seed bends it so")
 
 
 def test_a_time_out_ends_the_link_and_not_only_the_request():

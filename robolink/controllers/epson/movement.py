@@ -77,15 +77,22 @@ class EpsonMotion:
             return self._awaited(timeout_s)
 
     def _awaited(self, timeout_s: float) -> MotionOutcome:
+        unread: RemoteProtocolError | None = None
         try:
             with self._link.markers.doubt(self.statement):
-                arrived = self._watch(Deadline.after(self._link.clock, timeout_s))
+                try:
+                    arrived = self._watch(Deadline.after(self._link.clock, timeout_s))
+                except RemoteProtocolError as error:
+                    if not self._link.session.alive:
+                        raise
+                    # Flags that cannot be read leave the movement unwatched, not its end in doubt.
+                    unread, arrived = error, False
         except KeyboardInterrupt:
             self.abort()
             raise
         if not arrived:
             self.abort()
-            raise not_ended_in_time(self.statement, timeout_s)
+            raise unread or not_ended_in_time(self.statement, timeout_s)
         return self._settle()
 
     def abort(self) -> None:

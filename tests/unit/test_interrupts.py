@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from robolink.interrupts import InterruptGate
+from robolink.interrupts import InterruptGate, seen_through
 
 
 @pytest.fixture
@@ -95,3 +95,27 @@ def test_two_sessions_of_one_program_hold_it_back_alike(gate):
     other.close()
     with pytest.raises(KeyboardInterrupt), gate:
         signal.raise_signal(signal.SIGINT)
+
+
+def test_a_block_that_is_seen_through_within_a_session_leaves_its_handler_in_place(gate):
+    watched = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), gate:
+        with seen_through():
+            signal.raise_signal(signal.SIGINT)
+        assert gate.interrupted  # until the outer end
+        assert signal.getsignal(signal.SIGINT) == watched
+
+
+def test_a_handler_that_the_program_sets_meanwhile_stays_when_the_last_gate_closes():
+    before, seen = signal.getsignal(signal.SIGINT), list[str]()
+    gate = InterruptGate()
+    gate.open()
+    try:
+        with gate, seen_through():
+            signal.signal(signal.SIGINT, lambda *_: seen.append("theirs"))
+        signal.raise_signal(signal.SIGINT)
+        gate.close()
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert seen == ["theirs", "theirs"]

@@ -51,11 +51,9 @@ from robolink.model import angle_difference_deg
 SHOWN_IN: Final = 0.95
 """Share of tests that must contradict a shift before a turn test counts as showing that shift."""
 
-_NODES: Final = tuple(step / 2 for step in range(-12, 13))
-"""Nodes for integration over the error that all drifts have in common, in standard deviations."""
-
-_WEIGHTED: Final = tuple((node, math.exp(-node * node / 2)) for node in _NODES)
-_WHOLE: Final = sum(weight for _, weight in _WEIGHTED)
+_NODES: Final = tuple((step / 2, math.exp(-step * step / 8)) for step in range(-12, 13))
+"""Nodes of an integration over the error that all drifts share, in standard deviations; weights."""
+_WHOLE: Final = sum(weight for _, weight in _NODES)
 _ROOT_2: Final = math.sqrt(2)
 
 _HALVINGS: Final = 16
@@ -115,7 +113,7 @@ def shows_from_mm(views: Sequence[View], coordinates: int, nu: float | None) -> 
 def _missed(shift_mm: float, limits: Sequence[tuple[View, float]]) -> float:
     """Return the probability that no drift shows a shift, whatever part they share."""
     missed = 0.0
-    for node, weight in _WEIGHTED:
+    for node, weight in _NODES:
         for one, limit_mm in limits:
             over = (limit_mm - shift_mm - node * one.shared_mm) / one.own_mm
             weight *= math.erfc(-over / _ROOT_2) / 2

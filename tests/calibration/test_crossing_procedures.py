@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import Beam, rotation_of, toward_zero
+from robolink.calibration import Beam, Touch, rotation_of, toward_zero
 from robolink.errors import CalibrationError
 from robolink.methods import (
     BeamsParameters,
@@ -15,7 +15,7 @@ from robolink.methods import (
     measure_z_touch,
     verify_by_crossing,
 )
-from robolink.methods.z_touch.procedure import verify_by_touching
+from robolink.methods.z_touch.procedure import TriggerLag, verify_by_touching
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
 from robolink.runner import Confirm, Move, Notify, Seek
 from robolink.stations import BeamStation, TouchStation
@@ -407,3 +407,16 @@ def test_touches_end_when_the_interval_is_narrow_enough(sigma_mm, until_mm, leas
 @pytest.mark.parametrize(("u_deg", "turned_deg"), [(90.0, -90.0), (0.0, 180.0), (-170.0, 10.0)])
 def test_u_turns_toward_zero(u_deg, turned_deg):
     assert toward_zero(u_deg, 180.0) == turned_deg
+
+
+@pytest.mark.parametrize("braking_mm_s2", [None, 200.0])
+@pytest.mark.parametrize("overshoot", [0.0, 0.0005])
+@pytest.mark.parametrize("latency_s", [-0.0004, 0.0, 0.02])
+def test_a_touch_is_corrected_by_what_the_measurement_found(latency_s, overshoot, braking_mm_s2):
+    """A latency just below zero is scatter: the measurement let it pass, so the test does."""
+    lag = TriggerLag(latency_s, overshoot)
+    for speed_mm_s in (1.0, 2.0, 5.0):
+        by_braking = 0.0 if braking_mm_s2 is None else speed_mm_s**2 / (2 * braking_mm_s2)
+        read_mm = 33.0 - speed_mm_s * latency_s - speed_mm_s**2 * overshoot - by_braking
+        touch = Touch(read_mm, speed_mm_s)
+        assert lag.height_mm(touch, braking_mm_s2) == pytest.approx(33.0, abs=1e-12)

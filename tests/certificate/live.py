@@ -52,6 +52,7 @@ from robolink.methods import (
     SphereSurvey,
     SphereTouchSource,
     TwoPoseSource,
+    ZTouchParameters,
     ZTouchSource,
     informative_tilts,
 )
@@ -410,6 +411,13 @@ def z_touch(cell: Any, _rng: random.Random) -> Any:
     return ZTouchSource(cell.plate)
 
 
+def z_touch_quick(cell: Any, _rng: random.Random) -> Any:
+    """The same, tested by one touch: as the shipped recipe does."""
+    cell.mount_plate(**PLATE_NOISE)
+    plan = ZTouchParameters(test_speeds_mm_s=(2.0,), clearance_mm=2.5, back_off_mm=0.3, lift_mm=4.0)
+    return ZTouchSource(cell.plate, plan)
+
+
 def camera(cell: Any, _rng: random.Random) -> Any:
     """A camera, at four angles."""
     return CameraSource(cell.url, camera_station(cell))
@@ -493,6 +501,7 @@ COURSES: Final[tuple[Course, ...]] = (
             Course("beams once", kind, opened, beams_once, ("place_mm", "bend_deg")),
             Course("beams --turn", kind, opened, beams_turned, ("place_mm", "bend_deg")),
             Course("z-touch", kind, opened, z_touch, ("plate_mm",)),
+            Course("z-touch, quick", kind, opened, z_touch_quick, ("plate_mm",)),
             Course("camera", kind, opened, camera, (*_SEEN, "place_mm")),
             Course("camera, quick", kind, opened, camera_quick, (*_SEEN, "place_mm")),
             Course("camera, one look", kind, opened, camera_one_look, (*_SEEN, "place_mm")),

@@ -33,6 +33,7 @@ _COSTLY: Final[Mapping[str, float]] = {
     "beams once on PLC": 0.5,
     "beams --turn on PLC": 0.4,
     "z-touch on PLC": 0.5,
+    "z-touch, quick on PLC": 0.5,
     "plane-touch on PLC": 0.5,
     "sphere-touch on PLC": 0.5,
     "six-point on PLC": 0.7,
@@ -150,6 +151,9 @@ def _anywhere(rng: random.Random, half: float, count: int, *, beyond: bool) -> t
 _MOVES: Final = ("beams", "beams once", "camera, one look", "one-touch")
 """Methods that rely on the place of a station, so that a moved one turns into drift."""
 
+_LENGTHS: Final = ("z-touch", "z-touch, quick")
+"""Methods that tell Z alone."""
+
 _BUMPS: Final = ("two-pose", "n-angle", "n-angle, contact input")
 
 
@@ -177,7 +181,7 @@ def _moving(population: str, course: Course, seed: int, rng: random.Random) -> R
     if kind == "slip":
         size_mm = factor * min(limits)
         by = size_mm * toward
-        if course.method == "z-touch":
+        if course.method in _LENGTHS:
             at_write = slips(0.0, 0.0, math.copysign(size_mm, toward.real))
         else:
             at_write = slips(by.real, by.imag)

@@ -279,12 +279,9 @@ CELLS = (
             for mm in (0.05, 0.08)
             if (course, mm) not in {("beams on PLC", 0.05), ("camera on EPSON", 0.05)}
         ),
-        Cell(
-            "slips up by 0.08",
-            "z-touch on EPSON",
-            TAKEN_BACK,
-            CONTRADICTED,
-            at_write=slipped_up(0.08),
+        *(
+            Cell("slips up by 0.08", course, TAKEN_BACK, CONTRADICTED, at_write=slipped_up(0.08))
+            for course in ("z-touch on EPSON", "z-touch, quick on EPSON", "z-touch, quick on PLC")
         ),
     ),
     *soak(
@@ -650,7 +647,7 @@ def test_and_a_question_with_one(at, yes):
 def test_every_method_turns_once_more_from_where_its_turn_test_has_ended(course):
     """A shift of 0.4 mm contradicts each; the process allows more, or it would refuse first."""
     at = AtTerminal(course.name, lambda _cell: None, lambda _cell: None, {}, 0.0)
-    surface = course.method in ("plane-touch", "sphere-touch", "z-touch")
+    surface = course.method in ("plane-touch", "sphere-touch", "z-touch", "z-touch, quick")
     slip = slips(0.0, 0.0, 0.4) if surface else slips(0.4, -0.1)
     answers = Answers(" more ", " more ")  # one more touch, once more with the camera
     ended = at_a_terminal(at, answers, at_write=slip, drift_mm=1.0)

@@ -45,6 +45,7 @@ RELATIONS = [
     ("n-angle", {"off_in_contact": True}, "off_in_contact", "goes with"),
     ("z-touch", {"clearance_mm": 12, "input": 5}, "clearance_mm", "must be smaller than"),
     ("z-touch", {"speeds_mm_s": (2, 2), "input": 5}, "speeds_mm_s", "must differ by a factor"),
+    ("z-touch", {"test_speeds_mm_s": (2, 3), "input": 5}, "test_speeds_mm_s", "must hold speeds"),
     ("z-touch", {"until_mm": 0.1, "input": 5}, "until_mm", "has nothing to leave out"),
     ("beams", {"search_mm": 6}, "aside_mm", "must be larger than"),
     (

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Final, Self
 
-from annotated_types import Ge, Le, MinLen
+from annotated_types import Ge, Le, MaxLen, MinLen
 
 from robolink.calibration import MIN_ROTATION_DEG, tip_pose
 from robolink.files.toml import Problem
@@ -111,6 +111,20 @@ class ZTouchParameters(SampledParameters):
             )
         ),
     ] = 180.0
+    test_speeds_mm_s: Annotated[
+        tuple[Annotated[float, Ge(0.1), Le(10)], ...] | None,
+        MinLen(1),
+        MaxLen(8),
+        MM_S,
+        Option(flag="--test-speeds", metavar="2,.."),
+        Help(
+            declared(
+                "Speed of each touch of the turn test, from those of the measurement, whose "
+                "latency then counts. Without it, the test touches as the measurement does and "
+                "finds the latency again."
+            )
+        ),
+    ] = None
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
@@ -138,6 +152,12 @@ class ZTouchParameters(SampledParameters):
             yield Problem(
                 "speeds_mm_s",
                 tr("must differ by a factor of {factor:g} or more", factor=_SPEEDS_APART),
+            )
+        unknown = [one for one in self.test_speeds_mm_s or () if one not in self.speeds_mm_s]
+        if unknown:
+            yield Problem(
+                "test_speeds_mm_s",
+                tr("must hold speeds of {other} only", other=check.spell("speeds_mm_s")),
             )
         yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
 
@@ -206,7 +226,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
     def proof_of(self, basis: ProofBasis) -> "ProbeTest":
         """Return the test at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
         from robolink.calibration import toward_zero
-        from robolink.methods.z_touch.procedure import ProbeTest  # numpy
+        from robolink.methods.z_touch.procedure import ProbeTest, TriggerLag  # numpy
 
         context, tool = basis.context, basis.tool
         here = context.stands or context.controller.groups[0].pose()
@@ -219,6 +239,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
             angles_deg=(toward_zero(frame.u_deg, self.plan.proof_turn_deg),),
             deceleration_mm_s2=_told_braking(context),
             step_mm=_told_step(context, self.plan),
+            trigger=None if self.plan.test_speeds_mm_s is None else TriggerLag.of(basis.result),
         )
 
 

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from statistics import fmean
+from typing import ClassVar, Self
 
 from robolink.calibration import (
     USUAL_DECELERATION_MM_S2,
+    CalibrationResult,
     Drift,
     FlangePlane,
     Touch,
@@ -45,6 +47,47 @@ def touch_surface(
     return (yield from sample_sequentially(probing, first, speeds_mm_s, source.plan.sampling))
 
 
+@dataclass(frozen=True, slots=True)
+class TriggerLag:
+    """By how much a trigger comes late, as a measurement found it.
+
+    Attributes:
+        latency_s: Its latency.
+        overshoot_s2_per_mm: How far the robot moves while it brakes, per square of the speed, where
+            three speeds showed it; else 0.
+    """
+
+    latency_s: float
+    overshoot_s2_per_mm: float = 0.0
+
+    @classmethod
+    def of(cls, result: CalibrationResult) -> Self | None:
+        """Return what a measurement found; ``None`` if it is none by touches."""
+        if not isinstance(result, ZTouchResult):
+            return None
+        return cls(result.latency_s, result.overshoot_s2_per_mm or 0.0)
+
+    def height_mm(self, touch: Touch, deceleration_mm_s2: float | None) -> float:
+        """Return the height of the frame when the tip met the surface.
+
+        Args:
+            touch: Where it was when the trigger was read, and at which speed.
+            deceleration_mm_s2: How the robot brakes, where its controller told it.
+        """
+        braking = 0.0 if deceleration_mm_s2 is None else 1 / (2 * deceleration_mm_s2)
+        per_square = braking + self.overshoot_s2_per_mm
+        return touch.z_mm + touch.speed_mm_s * (self.latency_s + touch.speed_mm_s * per_square)
+
+
+def _speeds_of_test(plan: ZTouchParameters, trigger: TriggerLag | None) -> tuple[float, ...]:
+    """Return the speeds of the touches of a test; those of the plan need the trigger to be known.
+
+    Otherwise it touches as the measurement does.
+    """
+    stated = plan.test_speeds_mm_s
+    return plan.speeds_mm_s if stated is None or trigger is None else stated
+
+
 @checks_arguments
 def verify_by_touching(
     station: TouchStation,
@@ -56,6 +99,7 @@ def verify_by_touching(
     aside: ToolOffset = NO_OFFSET,
     deceleration_mm_s2: float | None = None,
     step_mm: float | None = None,
+    trigger: TriggerLag | None = None,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and touch the surface there again. Runs in the new tool.
 
@@ -69,6 +113,8 @@ def verify_by_touching(
             to a reference was written.
         deceleration_mm_s2: As for :func:`~robolink.methods.measure_z_touch`.
         step_mm: Likewise.
+        trigger: By how much the measurement found that the trigger comes late, for touches at the
+            speeds that the plan states for the test; without it the test finds that anew.
 
     Raises:
         CalibrationError: As :func:`~robolink.methods.measure_z_touch`.
@@ -89,14 +135,19 @@ def verify_by_touching(
     """
     source, drifts = ZTouchSource(station, plan, None, deceleration_mm_s2, step_mm), list[Drift]()
     for angle_deg in angles_deg:
-        probing = _ZTouchSampler(source, replace(here, u_deg=angle_deg), aside, here)
+        frame = replace(here, u_deg=angle_deg)
+        probing = _ZTouchSampler(source, frame, aside, here)
         touches = []
-        for speed_mm_s in plan.speeds_mm_s:
+        for speed_mm_s in _speeds_of_test(plan, trigger):
             touches.append((yield from probing.take(speed_mm_s)))
         yield from probing.away()
-        here, found = probing.here, probing.solve(touches)
+        here = probing.here
+        if trigger is None:
+            height_mm = probing.solve(touches).flange_z_mm
+        else:
+            height_mm = fmean(trigger.height_mm(touch, deceleration_mm_s2) for touch in touches)
         rise_mm = FlangePlane.of(probing.frame).rise_mm(aside)
-        drifts.append(Drift(angle_deg, 0.0, 0.0, found.flange_z_mm + rise_mm - station.z_mm))
+        drifts.append(Drift(angle_deg, 0.0, 0.0, height_mm + rise_mm - station.z_mm))
     return VerifyResult(tuple(drifts), tolerance_mm, heights_only=True)
 
 
@@ -128,9 +179,9 @@ class _ZTouchSampler(TouchNames):
 
     def take(self, place: float) -> Procedure[Touch]:
         if not self.near:
-            yield from approach_path(
-                self._safe, here=self.here, purpose=tr("Moving above the surface.")
-            )
+            # From above in one movement: in between nothing is met that is not met below.
+            high = replace(self._above, z_mm=max(self._safe.z_mm, self.here.z_mm))
+            yield from approach_path(high, here=self.here, purpose=tr("Moving above the surface."))
             self.here = yield Move(
                 self._above, Path.STRAIGHT, tr("Lowering to just above the place.")
             )
@@ -191,6 +242,8 @@ class ProbeTest(PlacedProof):
         angles_deg: U of the new tool at which it is.
         deceleration_mm_s2: How the robot brakes, where its controller told it.
         step_mm: How finely it tells where the input switched, likewise.
+        trigger: By how much the measurement found that the trigger comes late; ``None`` where the
+            test finds that anew.
     """
 
     method: ClassVar[str] = "z-touch"
@@ -201,6 +254,7 @@ class ProbeTest(PlacedProof):
     angles_deg: tuple[float, ...]
     deceleration_mm_s2: float | None
     step_mm: float | None = None
+    trigger: TriggerLag | None = None
 
     def steps(self, here: Pose) -> Procedure[VerifyResult]:
         """Return the steps from wherever the frame is."""
@@ -213,4 +267,5 @@ class ProbeTest(PlacedProof):
             aside=seen_from(self.written, self.tip),
             deceleration_mm_s2=self.deceleration_mm_s2,
             step_mm=self.step_mm,
+            trigger=self.trigger,
         )

@@ -100,6 +100,7 @@ class RunTimes:
     """How long the robot took in a run, as the journal has it.
 
     Attributes:
+        mode: What kind of run it was: see :class:`RunForecaster`.
         work: Digest of what the robot does in it.
         speed_percent, speed_mm_s: How fast.
         travel: What was foreseen of it, from its start.
@@ -110,6 +111,7 @@ class RunTimes:
         moves: The last movements that were measured.
     """
 
+    mode: str
     work: str
     speed_percent: int
     speed_mm_s: float
@@ -181,11 +183,11 @@ class Forecast:
             )
         if self.changed:
             unknown = tr(
-                "How long the robot needs is not known: the recipe, its speeds or its places have "
-                "changed since the last run."
+                "How long the robot needs is not known: the recipe, its speeds, its places or "
+                "robolink itself changed since the last run."
             )
         else:
-            unknown = tr("How long the robot needs is not known before its first run.")
+            unknown = tr("How long the robot needs is not known before the first run of this kind.")
         if self.straight_s < _SHORTEST_S:
             return unknown
         least = tr("Its straight moves alone take {seconds} s.", seconds=_rounded(self.straight_s))
@@ -215,6 +217,7 @@ class RunForecaster:
     Args:
         controller: The controller; its record is read, and nothing is asked.
         recipe: Name of the recipe.
+        mode: What kind of run it is: a change, a reference, a check; with which other sensor.
         work: Digest of what the robot does; see :func:`work_digest`.
         plan: The plan.
         steps: The foreseen steps of the measurement.
@@ -222,6 +225,7 @@ class RunForecaster:
 
     controller: Controller
     recipe: str
+    mode: str
     work: str
     plan: ChangePlan
     steps: Sequence[PlannedStep]
@@ -239,9 +243,10 @@ class RunForecaster:
         runs = list(islice(self.controller.outcomes.recorded(kinds=(EntryKind.RUN,)), _LOOKED_AT))
         named = [(one.signature.recipe, RunTimes.recorded(one)) for one in runs]
         known = [(name, times) for name, times in named if times is not None]
+        same = [times for name, times in known if (name, times.mode) == (self.recipe, self.mode)]
         journey, work = self._parts()
         travel = Travel.of(work)
-        alike = [one for _, one in known if one.work == self.work and one.travel.is_like(travel)]
+        alike = [one for one in same if one.work == self.work and one.travel.is_like(travel)]
         about_s, with_journey = None, False
         if last := alike[:_LAST]:
             about_s = median(one.at(answer_s) for one in last)
@@ -254,7 +259,7 @@ class RunForecaster:
             / self.plan.limits.speed_mm_s,
             with_journey,
             len(last),
-            not last and any(name == self.recipe for name, _ in known),
+            bool(same and not last),
             answer_s,
         )
 
@@ -269,6 +274,7 @@ class RunForecaster:
             return None
         answers, limits = self.controller.answers, self.plan.limits
         times = RunTimes(
+            self.mode,
             self.work,
             limits.speed_percent,
             limits.speed_mm_s,
@@ -357,17 +363,16 @@ def _between(points: Iterable[tuple[float, float]], at: float, alike: float) -> 
     return below_s if at - below <= max(alike, _ALIKE * at) and below else None
 
 
-def work_digest(recipe: "Recipe", plan: ChangePlan, *, version: str, more: str) -> str:
+def work_digest(recipe: "Recipe", plan: ChangePlan, *, version: str) -> str:
     """Return what tells two runs apart whose robot does not do the same.
 
     Args:
         recipe: The recipe, as its file has it.
         plan: The plan.
         version: Version of robolink: another one may move differently.
-        more: What else it depends on.
     """
     said = [f"{name}={getattr(recipe, name)!r}" for name in sorted(_moves(recipe))]
-    said += [version, more, f"{plan.limits.speed_percent} {plan.limits.speed_mm_s:g}"]
+    said += [version, f"{plan.limits.speed_percent} {plan.limits.speed_mm_s:g}"]
     return hashlib.sha256("\n".join(said).encode()).hexdigest()[:16]
 
 

@@ -140,7 +140,7 @@ class RecipeRun:
         self.forecast: Forecast | None = None
         self.robot_s: float | None = None
         self._of_file = loaded.recipe
-        self._other_sensor = sensor if isinstance(sensor, str) else type(sensor).__name__
+        self._other_sensor = sensor if isinstance(sensor, str) else "" if sensor is None else "own"
         self._ahead: RunForecaster | None = None
 
     def preflight(self) -> None:
@@ -189,13 +189,17 @@ class RecipeRun:
         require_ready(controller, self.plan)
         steps = preview(controller, self.plan)
         require_inside(controller, steps)
-        work = work_digest(
-            self._of_file,
+        mode = "check" if self._measure_only else "change"
+        mode = "reference" if self.takes_reference else mode
+        version = controller.outcomes.signature.version
+        self._ahead = RunForecaster(
+            controller,
+            self._loaded.name,
+            f"{mode} {self._other_sensor}".strip(),
+            work_digest(self._of_file, self.plan, version=version),
             self.plan,
-            version=controller.outcomes.signature.version,
-            more=f"{self.takes_reference} {self._measure_only} {self._other_sensor}",
+            steps,
         )
-        self._ahead = RunForecaster(controller, self._loaded.name, work, self.plan, steps)
         self.forecast = self._ahead.forecast()
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:

@@ -6,11 +6,13 @@ from types import SimpleNamespace
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.calibration_run import ChangePlan, Limits, PlannedStep, ToolPlan
+from robolink.calibration_run import ChangePlan, Limits, NozzleChange, PlannedStep, ToolPlan
 from robolink.calibration_run._forecast import RunForecaster, RunTimes
+from robolink.controllers import SimpleController
 from robolink.journal import memory_journal
+from robolink.methods import PointsSource
 from robolink.model import EntryKind, MotionProfile, NewEntry, Path, Pose, Signature, WorkBox
-from robolink.runner import RobotTime
+from robolink.runner import Confirm, RobotTime, Runner, RunSettings
 from robolink.timing import AnswerTimes
 
 PARKED, START, PLACE = (Pose(x, 0, 50, 0, tool=0) for x in (0, 300, 400))
@@ -55,9 +57,10 @@ def step(start, target):
     return PlannedStep("", target, MotionProfile(Path.JOINT), start=start)
 
 
-def forecaster(link, *, parked=PARKED, work="w", **limits):
-    steps = (*([step(parked, START)] if parked != START else ()), step(START, PLACE))
-    return RunForecaster(link, "needle", work, plan_of(**limits), steps)
+def forecaster(link, *, parked=PARKED, mode="change", work="w", further_mm=0, **limits):
+    there = Pose(PLACE.x_mm + further_mm, 0, 50, 0, tool=0)
+    steps = (*([step(parked, START)] if parked != START else ()), step(START, there))
+    return RunForecaster(link, "needle", mode, work, plan_of(**limits), steps)
 
 
 def run(link, *, parked=PARKED, unusual=False, **more):
@@ -112,25 +115,23 @@ def test_a_way_that_no_run_has_shown_is_left_out_and_that_is_said():
     assert again.about_s == pytest.approx(time.seconds)
 
 
-@pytest.mark.parametrize("changed", [{"work": "other"}, {"speed_percent": 9}])
-def test_a_run_of_other_movements_tells_nothing(changed):
+def test_a_run_of_other_movements_or_of_another_kind_tells_nothing():
     link = linked()
     run(link)
-    found = forecaster(link, **changed).forecast()
-    if "work" in changed:
-        assert (found.about_s, found.changed) == (None, True)
-    else:  # its digest holds the speed; the way to the start has to look at it again
-        assert not found.with_journey
+    found = forecaster(link, work="other").forecast()
+    assert (found.about_s, found.changed) == (None, True)
+    assert "changed since the last run" in found.sentence
+    found = forecaster(link, mode="reference").forecast()
+    assert (found.about_s, found.changed) == (None, False)
+    # The digest holds the speed; for the move to the start it has to be looked at again.
+    assert not forecaster(link, speed_percent=9).forecast().with_journey
 
 
 def test_a_longer_way_tells_nothing_and_another_nozzle_is_no_other_way():
     link = linked()
     run(link)
-    for further_mm, known in ((4, True), (40, False)):
-        there = Pose(PLACE.x_mm + further_mm, 0, 50, 0, tool=0)
-        steps = (step(PARKED, START), step(START, there))
-        found = RunForecaster(link, "needle", "w", plan_of(), steps).forecast()
-        assert (found.about_s is not None) is known
+    assert forecaster(link, further_mm=4).forecast().about_s is not None
+    assert forecaster(link, further_mm=40).forecast().about_s is None
 
 
 def test_a_run_in_which_something_was_repeated_is_not_recorded():
@@ -160,4 +161,33 @@ def test_without_an_answer_time_a_run_counts_as_it_was():
 def test_nothing_is_said_where_nothing_moves():
     link = linked()
     link.plan = SimpleNamespace(moves=False)
-    assert RunForecaster(link, "needle", "w", link.plan, ()).forecast() is None
+    assert RunForecaster(link, "needle", "change", "w", link.plan, ()).forecast() is None
+
+
+@pytest.mark.parametrize("answer", ["y", "n"])
+def test_an_offer_that_is_accepted_makes_a_run_unusual(answer):
+    controller = SimpleController(identity=f"offer-{answer}")
+    person = SimpleNamespace(ask=lambda *_: None, tell=lambda *_: None, poll=lambda _: answer)
+    runner = Runner(controller, controller.groups[0], person, RunSettings(WorkBox()))
+
+    def course():
+        yield Confirm("One more touch?")
+
+    runner.run(course())
+    assert runner.robot_time.usual is (answer == "n")
+
+
+def test_a_measurement_that_is_made_again_makes_a_run_unusual():
+    touches = iter([[PLACE, PLACE], [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]])
+    plan = ToolPlan(1, source=PointsSource(lambda: next(touches)), verify=False, attempts=2)
+    nobody = SimpleNamespace(tell=lambda *_: None)
+    with SimpleController(identity="made-again") as controller:
+        time = RobotTime(controller)
+        change = NozzleChange(
+            controller,
+            ChangePlan((plan,), ask_before_write=False),
+            operator=nobody,
+            robot_time=time,
+        )
+        change.run(write=False)
+    assert not time.usual

@@ -71,7 +71,7 @@ def measured_needle() -> Iterator[Figure]:
     """
     requests = 0
     for answer_ms, (what, wanted_s) in NEEDLE_WANTED.items():
-        took_s, requests = measured(NEEDLE, answer_ms)
+        took_s, requests, _ = measured(NEEDLE, answer_ms)
         wanted = Amount(wanted_s, "s")
         yield Figure(what, Amount(took_s, "s"), "wanted", wanted, took_s / wanted_s, 1.0)
     wanted = Amount(NEEDLE_REQUESTS, "")

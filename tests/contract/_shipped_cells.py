@@ -14,7 +14,8 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.testkit.media import served
 
-from robolink.model import Pose, ToolOffset
+from robolink.model import ToolOffset
+from robolink.runner import TouchedAt
 from robolink.runner._place_question import PlaceQuestion
 from tests._commands import Ended, run_command
 from tests.contract._camera_cell import cell_of, furnish
@@ -128,7 +129,7 @@ def seconds_of_touches() -> Iterator[Callable[[], float]]:
     """Count the time in which a person is asked for a touch, until they have made it; jogs too."""
     answer, spent_ns = PlaceQuestion.answer, [0]
 
-    def counted(question: PlaceQuestion) -> Pose:
+    def counted(question: PlaceQuestion) -> TouchedAt:
         clock = question._controller.clock
         began_ns = clock.now_ns()
         try:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from pytest import MonkeyPatch
+import pytest
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -138,7 +138,7 @@ def seconds_of_touches() -> Iterator[Callable[[], float]]:
         finally:
             spent_ns[0] += clock.now_ns() - began_ns
 
-    with MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(PlaceQuestion, "answer", counted)
         yield lambda: spent_ns[0] / 1e9
 

@@ -8,13 +8,15 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
+from unittest.mock import patch
 
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.testkit.media import served
 
-from robolink.model import Pose, ToolOffset
+from robolink.model import ToolOffset
+from robolink.runner import TouchedAt
 from robolink.runner._place_question import PlaceQuestion
 from tests._commands import Ended, run_command
 from tests.contract._camera_cell import cell_of, furnish
@@ -128,7 +130,7 @@ def seconds_of_touches() -> Iterator[Callable[[], float]]:
     """Count the time in which a person is asked for a touch, until they have made it; jogs too."""
     answer, spent_ns = PlaceQuestion.answer, [0]
 
-    def counted(question: PlaceQuestion) -> Pose:
+    def counted(question: PlaceQuestion) -> TouchedAt:
         clock = question._controller.clock
         began_ns = clock.now_ns()
         try:
@@ -136,11 +138,8 @@ def seconds_of_touches() -> Iterator[Callable[[], float]]:
         finally:
             spent_ns[0] += clock.now_ns() - began_ns
 
-    PlaceQuestion.answer = counted  # type: ignore[method-assign]
-    try:
+    with patch.object(PlaceQuestion, "answer", counted):
         yield lambda: spent_ns[0] / 1e9
-    finally:
-        PlaceQuestion.answer = answer  # type: ignore[method-assign]
 
 
 @contextmanager

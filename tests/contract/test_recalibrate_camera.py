@@ -80,6 +80,7 @@ def test_the_example_measures_writes_and_proves_a_nozzle(run, epson, capsys):
     told(capsys, "pick nozzle, camera recipe", seconds)
     assert seconds < 8.0  # by the simulated clock: 7.90 s, the same in each run
     safe, stands = load_recipe(Path(CAMERA)).recipe.poses.safe, simulator.world.robot.flange()
+    assert safe is not None
     assert stands.coordinates()[:3] == pytest.approx(safe.pose.coordinates()[:3], abs=0.01)
     assert stands.u_deg == pytest.approx(safe.u_deg + 90.0, abs=0.01)
     found, true = simulator.machine.tools.get(1), simulator.world.tips[1]

@@ -258,8 +258,8 @@ def test_a_camera_tests_at_the_planned_angles_as_it_measured(measured_at, planne
         dx, dy = rotate_xy(12, -4, u_deg)
         looks.append(Sighting(Pose(300 - dx, 80 - dy, -10, u_deg, tool=0), 300.0, 80.0))
     result = replace(solve_camera_round(looks), offset=written)
-    no_context: Any = None
-    proof: Any = source.proof(no_context, 1, result, tip=written, tolerance_mm=0.1)
+    nobody: Any = None
+    proof: Any = source.proof(nobody, 1, result, tip=written, tolerance_mm=0.1)
     assert proof.angles_deg == pytest.approx([angle + written.u_deg for angle in tested_at])
 
 

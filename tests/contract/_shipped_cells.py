@@ -8,8 +8,8 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
+from unittest.mock import patch
 
-import pytest
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -138,8 +138,7 @@ def seconds_of_touches() -> Iterator[Callable[[], float]]:
         finally:
             spent_ns[0] += clock.now_ns() - began_ns
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(PlaceQuestion, "answer", counted)
+    with patch.object(PlaceQuestion, "answer", counted):
         yield lambda: spent_ns[0] / 1e9
 
 

@@ -101,23 +101,21 @@ def test_a_nozzle_that_slips_after_the_write_fails_the_proof(cell):
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.02])
 @pytest.mark.parametrize("slip_mm", [0.0, 0.06, -0.06])
-def test_one_touch_tests_a_length_by_the_latency_that_was_found(slip_mm, latency_s):
+def test_one_touch_tests_a_length_by_the_latency_that_was_found(cell, slip_mm, latency_s):
     class Slips(Followed):
         def wrote(self, receipt):
-            tip = replace(probed.truth, z_mm=probed.truth.z_mm + slip_mm)
-            probed.simulator.world.tips[TOOL] = tip
+            tip = replace(cell.truth, z_mm=cell.truth.z_mm + slip_mm)
+            cell.simulator.world.tips[TOOL] = tip
 
-    followed = Slips()
-    with sensor_cell() as probed:
-        probed.mount_plate(latency_s=latency_s)
-        source = ZTouchSource(probed.plate, ONE_TOUCH)
-        if slip_mm:
-            with pytest.raises(VerifyError) as refused:
-                probed.run(source, followed)
-            assert refused.value.code == "proof_contradicts_accuracy"
-        else:
-            report = probed.run(source, followed)
-            assert abs(report.verification.drifts[0].dz_mm) < BARELY_MM
+    cell.mount_plate(latency_s=latency_s)
+    source, followed = ZTouchSource(cell.plate, ONE_TOUCH), Slips()
+    if slip_mm:
+        with pytest.raises(VerifyError) as refused:
+            cell.run(source, followed)
+        assert refused.value.code == "proof_contradicts_accuracy"
+    else:
+        report = cell.run(source, followed)
+        assert abs(report.verification.drifts[0].dz_mm) < BARELY_MM
     speeds = [one.step.speed_mm_s for one in followed.steps if isinstance(one.step, Seek)]
     assert speeds == [2.0, 1.0, 2.0, 1.0, 2.0]
 

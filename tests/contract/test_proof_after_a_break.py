@@ -50,6 +50,7 @@ from robolink.methods import (
     SphereSurvey,
     SphereTouchSource,
     TwoPoseSource,
+    ZTouchParameters,
     ZTouchSource,
     informative_tilts,
 )
@@ -161,8 +162,17 @@ CASES = {
     "board": Case(with_a_board, board, ""),
     "beams": Case(with_switches, lambda cell: BeamsSource(cell.station)),
     "z-touch": Case(with_switches, lambda cell: ZTouchSource(cell.plate), "z_mm"),
+    "camera, one test angle": Case(
+        sensor_cell,
+        lambda cell: CameraSource(cell.url, camera_station(cell), test_turns_deg=(90.0,)),
+    ),
+    "z-touch, one touch": Case(
+        with_switches,
+        lambda cell: ZTouchSource(cell.plate, ZTouchParameters(test_speeds_mm_s=(2.0,))),
+        "z_mm",
+    ),
 }
-EACH_TIME = ("one-touch", "camera", "z-touch")
+EACH_TIME = ("one-touch", "camera", "z-touch", "z-touch, one touch")
 
 
 class Cuts(Listener):

@@ -41,10 +41,9 @@
     └── DeclinedError                      a person declined
         └── NotAllowedError                only an engineer may do it
 
-Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
-(:attr:`~RobolinkError.remedy`); ``str(error)`` is both. What it left on the controller is
-:attr:`~RobolinkError.controller_state`. Foreign exceptions are converted at the transport
-boundary only, always ``from`` the original.
+Each error says what happened (:attr:`~RobolinkError.what`), what to do next (``remedy``; both are
+``str(error)``), and what it left on the controller (``controller_state``). Foreign exceptions are
+converted at the transport boundary only, always ``from`` the original.
 """
 
 from enum import StrEnum
@@ -351,6 +350,7 @@ class NotReadyReason(StrEnum):
     STARTING = "starting"
     MOTORS_OFF = "motors_off"
     HIGH_POWER = "high_power"
+    ACCELERATION = "acceleration"
     WRONG_TOOL = "wrong_tool"
     NO_REMOTE_TIMEOUT = "no_remote_timeout"
     NO_ABORT = "no_abort"

@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
+from robolink.controllers import capabilities_of_kind
 from robolink.locale.languages import language_named
 from robolink.messages import tr
-from robolink.model import PersonRole
+from robolink.model import ACCELERATION_RANGE_MM_S2, PersonRole
 from robolink.transport import parse_url
 
 ShortText = Annotated[str, Field(min_length=1, max_length=200)]
@@ -195,6 +196,8 @@ class AccuracySettings(BaseModel):
 
 Text = Annotated[str, Field(min_length=1)]
 
+_LEAST_MM_S2, _HIGHEST_MM_S2 = ACCELERATION_RANGE_MM_S2
+
 
 class CellSettings(BaseModel):
     """One cell: how to reach it, and its limits. A missing key is ``None``.
@@ -212,6 +215,8 @@ class CellSettings(BaseModel):
             the wire (docs/reference/epson.md 1.1).
         remote_timeout_confirmed_by: Who looked at the controller's setting, and when.
         speed_mm_s: Speed of moves, in low power.
+        acceleration_mm_s2: Highest acceleration of straight movements; it is only ever lowered
+            to this.
         box_mm: How far, sideways, the flange may go in a calibration.
         jog_box_mm: How far the tool may be jogged, in every direction.
         lift_mm, clearance_mm: How far the tip is lifted before it turns, and how far above
@@ -239,6 +244,7 @@ class CellSettings(BaseModel):
     remote_timeout_s: Positive | None = None
     remote_timeout_confirmed_by: Annotated[Text | None, Field(validate_default=True)] = None
     speed_mm_s: Annotated[float, Field(ge=1, le=100)] | None = None
+    acceleration_mm_s2: Annotated[int, Field(ge=_LEAST_MM_S2, le=_HIGHEST_MM_S2)] | None = None
     box_mm: Annotated[float, Field(ge=1)] | None = None
     jog_box_mm: Positive | None = None
     lift_mm: Annotated[float, Field(ge=1, le=100)] | None = None
@@ -267,6 +273,16 @@ class CellSettings(BaseModel):
         if url is not None:
             parse_url(url)
         return url
+
+    @field_validator("acceleration_mm_s2")
+    @classmethod
+    def _applies(cls, stated: int | None, info: ValidationInfo) -> int | None:
+        # A URL that is wrong is missing from the data and already reported.
+        url = info.data.get("url")
+        able = capabilities_of_kind(parse_url(url).kind) if stated is not None and url else None
+        if able is not None and not able.acceleration:
+            raise ValueError(tr("cannot apply: robolink does not move controllers of this kind"))
+        return stated
 
     @field_validator("remote_timeout_confirmed_by")
     @classmethod

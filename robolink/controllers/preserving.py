@@ -202,7 +202,9 @@ def _judged(
         return Finding(marker, Verdict.DONE, sentence)
     if now == before:
         sentence = tr(
-            "Tool {tool} is selected, as before; the power mode or speed has changed.", tool=now
+            "Tool {tool} is selected, as before; the power mode, speed or acceleration has "
+            "changed.",
+            tool=now,
         )
     else:
         sentence = tr(

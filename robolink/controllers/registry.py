@@ -32,7 +32,15 @@ from robolink.errors import (
 )
 from robolink.journal import open_log, signature_here
 from robolink.messages import tr
-from robolink.model import Capabilities, ChangeLimits, Controller, OutcomeLog, Secret, Signature
+from robolink.model import (
+    Capabilities,
+    ChangeLimits,
+    Controller,
+    OutcomeLog,
+    Secret,
+    Signature,
+    require_acceleration,
+)
 from robolink.package_log import PackageLog
 from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.stop_latch import require_wait, waiting_for
@@ -79,6 +87,8 @@ class ConnectionTerms:
         password: For a login, if there is one.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set on an EPSON controller.
+        acceleration_mm_s2: Highest acceleration of straight movements, as the cell states it. A
+            kind that keeps it says so in its capabilities.
         clock: Replaces the machine's clock.
         trace: Receives all traffic. The links of robolink report it themselves; a kind with a link
             of its own makes a :class:`robolink.transport.Traffic` and reports to that.
@@ -91,6 +101,7 @@ class ConnectionTerms:
     password: Secret | None = None
     timeout_s: float = 3.0
     remote_timeout_s: float = 60.0
+    acceleration_mm_s2: int | None = None
     clock: Clock | None = None
     trace: TraceSink | None = None
     outcomes: OutcomeLog | None = None
@@ -213,6 +224,7 @@ def connect(
     password: str | Secret | None = None,
     timeout_s: float = 3.0,
     remote_timeout_s: float = 60.0,
+    acceleration_mm_s2: int | None = None,
     wait_s: float | None = None,
     clock: Clock | None = None,
     trace: TraceSink | None = None,
@@ -232,6 +244,7 @@ def connect(
     password: str | Secret | None = None,
     timeout_s: float = 3.0,
     remote_timeout_s: float = 60.0,
+    acceleration_mm_s2: int | None = None,
     wait_s: float | None = None,
     clock: Clock | None = None,
     trace: TraceSink | None = None,
@@ -250,6 +263,7 @@ def connect(
     password: str | Secret | None = None,
     timeout_s: float = 3.0,
     remote_timeout_s: float = 60.0,
+    acceleration_mm_s2: int | None = None,
     wait_s: float | None = None,
     clock: Clock | None = None,
     trace: TraceSink | None = None,
@@ -272,6 +286,9 @@ def connect(
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set on an EPSON controller. It cannot be read
             over the wire; 0 forbids motion. A PLC's watchdog is part of its mailbox program.
+        acceleration_mm_s2: Highest acceleration and deceleration of straight movements, by the cell
+            file (``cell.settings.acceleration_mm_s2``). It only lowers what the controller has;
+            without it robolink sets none. A whole number, so that no controller rounds it up.
         wait_s: How long connecting, and later each call of this controller, waits for another
             working program or thread, in seconds; ``None`` or 0 refuses at once. The
             controller has it as ``patience.wait_s``.
@@ -294,7 +311,8 @@ def connect(
             seconds until a PLC releases the mailbox of a run that has ended.
 
     Raises:
-        ConfigError: The URL or an option is wrong, or leads to another kind of controller.
+        ConfigError: The URL or an option is wrong, or leads to another kind of controller, or to
+            one that keeps to no acceleration although one is given (unless it is only read).
         ConnectError: No connection, no answer to the login, or the PLC's mailbox program does
             not run.
         RemoteProtocolError: The far end is not a mailbox of this version, or the probe of a
@@ -322,6 +340,8 @@ def connect(
         _require_kind(type(url), kind, str(url.identity))
         return url
     link, wait_s = parse_url(url), require_wait(wait_s or 0.0)
+    if acceleration_mm_s2 is not None:
+        require_acceleration(acceleration_mm_s2)
     if kind is not None and link.kind in _KINDS:  # before any connection is made
         _require_kind(_class_of_kind(link.kind), kind, url)
     terms = ConnectionTerms(
@@ -329,6 +349,7 @@ def connect(
         password=Secret(password) if isinstance(password, str) else password,
         timeout_s=timeout_s,
         remote_timeout_s=remote_timeout_s,
+        acceleration_mm_s2=acceleration_mm_s2,
         clock=clock,
         trace=trace,
         outcomes=outcomes,
@@ -338,6 +359,8 @@ def connect(
     controller = _waited_for(lambda: opened(link, terms), wait_s, tell)
     try:
         _require_kind(type(controller), kind, url)
+        if acceleration_mm_s2 is not None and not glance:
+            require_acceleration(acceleration_mm_s2, controller)
         if wait_s:
             controller.patience.wait_s, controller.patience.tell = wait_s, tell
     except BaseException:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from robolink.model._change_limits import PersonRole as PersonRole
     from robolink.model._change_limits import refuse_operator as refuse_operator
     from robolink.model._change_limits import require_engineer as require_engineer
+    from robolink.model._controller import ACCELERATION_RANGE_MM_S2 as ACCELERATION_RANGE_MM_S2
     from robolink.model._controller import Act as Act
     from robolink.model._controller import AlarmList as AlarmList
     from robolink.model._controller import Capabilities as Capabilities
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from robolink.model._controller import VariableTable as VariableTable
     from robolink.model._controller import are_simulated_facts as are_simulated_facts
     from robolink.model._controller import is_simulated_name as is_simulated_name
+    from robolink.model._controller import require_acceleration as require_acceleration
     from robolink.model._controller import says_it_is_simulated as says_it_is_simulated
     from robolink.model._documents import from_json as from_json
     from robolink.model._documents import to_json as to_json
@@ -136,9 +138,9 @@ else:
                 "ChangeGuard ChangeLimits PersonRole refuse_operator require_engineer"
             ),
             "_controller": (
-                "Act AlarmList Capabilities Controller DigitalIo PointReader Value "
-                "ValueReceipt ValueT VariableTable are_simulated_facts "
-                "is_simulated_name says_it_is_simulated"
+                "ACCELERATION_RANGE_MM_S2 Act AlarmList Capabilities Controller DigitalIo "
+                "PointReader Value ValueReceipt ValueT VariableTable are_simulated_facts "
+                "is_simulated_name require_acceleration says_it_is_simulated"
             ),
             "_documents": "from_json to_json",
             "_geometry": (

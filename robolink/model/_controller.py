@@ -6,9 +6,10 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
 from types import TracebackType
-from typing import Final, Generic, Protocol, Self, TypeVar
+from typing import ClassVar, Final, Generic, Protocol, Self, TypeVar
 
-from robolink.errors import ControllerError
+from robolink.errors import ConfigError, ControllerError
+from robolink.messages import tr
 from robolink.model._change_limits import ChangeGuard
 from robolink.model._geometry import Pose
 from robolink.model._identity import ControllerFacts
@@ -155,7 +156,11 @@ class Capabilities:
         low_power: Whether each movement uses a gentle power mode of the controller.
         looks: Whether it has a vision system of its own (:class:`LookingController`).
         inputs_only: Whether ``io`` reads inputs and switches no output.
+        acceleration: Whether its straight movements stay below an acceleration that the cell
+            states.
     """
+
+    json_version: ClassVar = 2
 
     tool_write: bool = False
     motion: bool = False
@@ -164,10 +169,46 @@ class Capabilities:
     low_power: bool = False
     looks: bool = False
     inputs_only: bool = False
+    acceleration: bool = False
     io: bool = False
     points: bool = False
     variables: bool = False
     alarms: bool = False
+
+
+ACCELERATION_RANGE_MM_S2: Final = (100, 35_000)
+"""What a cell may state: braking with less is none (docs/reference/evidence.md 13), and no AccelS
+is higher (docs/reference/spel.md 7.2)."""
+
+
+def require_acceleration(stated_mm_s2: int, controller: "Controller | None" = None) -> None:
+    """Refuse a highest acceleration of straight movements that no cell may state.
+
+    Args:
+        stated_mm_s2: The acceleration.
+        controller: Whose movements have to keep it.
+
+    Raises:
+        ConfigError: It is no whole number in the range, or the controller keeps to none.
+
+    Example:
+        >>> from robolink.model import require_acceleration
+        >>> require_acceleration(150)
+    """
+    low, high = ACCELERATION_RANGE_MM_S2
+    if type(stated_mm_s2) is not int or not low <= stated_mm_s2 <= high:
+        raise ConfigError(
+            tr("The highest acceleration cannot be {given!r} mm/s^2.", given=stated_mm_s2),
+            remedy=tr("Give a whole number from {low} to {high}.", low=low, high=high),
+        )
+    if controller is not None and not controller.capabilities.acceleration:
+        raise ConfigError(
+            tr(
+                "robolink cannot limit the acceleration of {controller}, and the cell states one.",
+                controller=controller.identity,
+            ),
+            remedy=tr("Remove acceleration_mm_s2 from the cell file, or from the call."),
+        )
 
 
 class Controller(Protocol):

@@ -214,6 +214,7 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
         "url": URL,
         "timeout_s": 2.0,
         "remote_timeout_s": 60.0,
+        "acceleration_mm_s2": None,
         "wait_s": 0.0,
         "trace": None,
         "glance": False,

@@ -95,6 +95,25 @@ def test_nothing_moves_in_a_cell_without_a_confirmed_remote_timeout(cell, simula
     assert main.run(["-c", "a", "jog", "z+0.1", "--yes"]) == 0
 
 
+def test_a_movement_keeps_the_acceleration_of_the_cell_and_puts_back_what_was(
+    cell, simulator, capsys
+):
+    simulator.machine.motors_on = True
+    simulator.machine.parameters.accel_s = before = (5000.0, 80.0, 300.0, 250.0, 200.0, 99.0)
+    cell(CONFIRMED + "acceleration_mm_s2 = 150")
+    assert main.run(["-c", "a", "jog", "z+0.1", "--dry-run"]) == 0
+    assert "AccelS 150.000, 150.000" in capsys.readouterr().out
+    assert main.run(["-c", "a", "jog", "z+0.1", "--yes"]) == 0
+    asked = [text for _, way, text in simulator.log if way == ">" and '"AccelS' in text]
+    assert [text.partition('"')[2] for text in asked] == [
+        'AccelS 150.000, 80.000"',
+        'AccelS 5000.000, 80.000, 300.000, 250.000, 200.000, 99.000"',
+    ]
+    assert simulator.machine.parameters.accel_s == before
+    assert main.run(["cell", "show", "a"]) == 0
+    assert "acceleration_mm_s2" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("robot", ["T6-602S", "t6-602s"])
 def test_the_expected_robot_is_let_through(cell, simulator, robot):
     cell(f"robot = '{robot}'")

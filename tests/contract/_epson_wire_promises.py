@@ -13,15 +13,19 @@ Line = tuple[int, str, str]
 LOOK = ("Tool", "Motor", "Power", "Speed(1)", "SpeedS(1)")
 """What has to be read before each movement."""
 
+ACCELERATION = ("AccelS(1)", "AccelS(2)")
+"""What has to be read besides, where the cell states an acceleration."""
+
 WATCH_S = 0.5
 """Longest time between two looks at the flags while the robot moves."""
 
 _STATEMENT = re.compile(r'\$Execute,"(.*)"')
 _TEXT = re.compile(r'#Execute,"(.*?)(?:\\r\\n|\s)*"', re.DOTALL)
 _MOVEMENT = re.compile(r"(Move|Go) ")
-_SETTING = re.compile(r"(Tool \d+|Power (?:Low|High)|SpeedS? [\d., ]+)$")
+_SETTING = re.compile(r"(Tool \d+|Power (?:Low|High)|(?:SpeedS?|AccelS) [\d., ]+)$")
 _SETS_BACK = re.compile(r"\$(Abort|Reset|SetMotorsOn)\b")
 _SLOW = ("Power Low", "Speed ", "SpeedS ")
+_STATED = "AccelS "
 
 
 @dataclass
@@ -91,10 +95,12 @@ class Speeds:
     Attributes:
         percent: Of joint movements.
         mm_s: Of straight movements: of its own, and of its searches.
+        mm_s2: The highest acceleration of straight movements; 0 where the cell states none.
     """
 
     percent: int
     mm_s: Collection[float]
+    mm_s2: float = 0.0
 
 
 def broken_promises(log: Sequence[Line], speeds: Speeds) -> list[str]:
@@ -102,18 +108,19 @@ def broken_promises(log: Sequence[Line], speeds: Speeds) -> list[str]:
 
     Before a movement all of :data:`LOOK` was read, after the last movement and the last setting:
     the tool is the one that was selected last, the motors are on, power is low, the speed is as
-    wanted. That it was answered shows that Execute was available. After a request that puts power
-    and speed back they were set anew, whatever is read. While it moves, the flags are looked at;
-    after it, the position is read before the next one begins.
+    wanted, and the acceleration no higher. That it was answered shows that Execute was available.
+    After a request that puts power and speed back they were set anew, whatever is read. While it
+    moves, the flags are looked at; after it, the position is read before the next one begins.
     """
     known, broken = _Known(), list[str]()
     for one in exchanges(log):
         what = one.request
         if _SETS_BACK.match(what):
-            known = replace(known, read={}, unset=set(_SLOW))
+            slow = {*_SLOW, _STATED} if speeds.mm_s2 else set(_SLOW)
+            known = replace(known, read={}, unset=slow)
         elif _SETTING.match(what):
             known.read.clear()
-            known.unset -= {name for name in _SLOW if what.startswith(name)}
+            known.unset -= {name for name in (*_SLOW, _STATED) if what.startswith(name)}
             if what.startswith("Tool "):
                 known.selected = what.removeprefix("Tool ")
         elif what.startswith("Print "):
@@ -139,7 +146,8 @@ def _missing(known: _Known, movement: str, speeds: Speeds) -> Iterator[str]:
         yield f"the end of {known.unseen} was not looked at"
     if known.unset:
         yield "power and speed were not set anew"
-    unread = [name for name in LOOK if name not in known.read]
+    looks = (*LOOK, *(ACCELERATION if speeds.mm_s2 else ()))
+    unread = [name for name in looks if name not in known.read]
     if unread:
         yield f"not read: {', '.join(unread)}"
         return
@@ -154,6 +162,10 @@ def _missing(known: _Known, movement: str, speeds: Speeds) -> Iterator[str]:
         yield f"speed {percent} %"
     if movement.startswith("Move ") and float(straight) not in speeds.mm_s:
         yield f"speed {straight} mm/s"
+    if speeds.mm_s2 and movement.startswith("Move "):
+        hardest = max(float(known.read[name]) for name in ACCELERATION)
+        if hardest > speeds.mm_s2:
+            yield f"acceleration {hardest:g} mm/s2"
 
 
 def _unwatched(movement: Exchange) -> Iterator[str]:

@@ -180,10 +180,16 @@ def _sent_in_part(transport: Any, data: bytes, **_named: object) -> None:
 
 def _not_looked(settings: Any, edge: object = None) -> Any:
     """Believe the settings that a movement wants."""
-    from robolink.controllers.epson.movement import ArmState
+    from robolink.controllers.epson.answers import ArmState
 
     (tool,) = settings._window.printed_numbers("Print Tool")
     return ArmState(int(tool), True, False, 5, 20.0, None if edge is None else False)
+
+
+def _set_as_stated(_state: Any, stated_mm_s2: float | None) -> Iterator[str]:
+    """Set the stated acceleration, whatever was found."""
+    if stated_mm_s2 is not None:
+        yield f"AccelS {stated_mm_s2:.3f}, {stated_mm_s2:.3f}"
 
 
 _ITSELF: Final[Mapping[str, StandIn]] = {
@@ -211,6 +217,9 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.stop_latch.StopLatch.calming": _calmed,
     "robolink.controllers.epson.preserve.EpsonPreserver._restore_more": _nothing,
     "robolink.controllers.epson.movement.Settings.look": _not_looked,
+    "robolink.controllers.epson.answers.ArmState.lowered": _set_as_stated,
+    "robolink.controllers.epson.movement.Settings.require_as_told": _nothing,
+    "robolink.controllers.epson.movement.EpsonMotionUntilInput._require_kept": _nothing,
     "robolink.controllers.connect_when_reachable": _knocking,
     "robolink.transaction.Settler.examine": _settled_unread,
     "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),

@@ -3,6 +3,8 @@
 The judge is held to its own promises: from a log that has all of them, one is taken at a time.
 """
 
+from dataclasses import replace
+
 import pytest
 from robolink_simulators.epson.options import EpsonOptions
 
@@ -46,6 +48,29 @@ def test_every_movement_of_a_recipe_is_proved(tmp_path, monkeypatch, example, co
     assert broken_promises(log, SPEEDS[example]) == []
     requests = sum(direction == ">" for _, direction, _ in log)
     assert comma == "nothing" or requests <= MOST_REQUESTS.get(example, requests)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("example", ["scara-pin", "needle-beams"])
+def test_every_movement_keeps_the_acceleration_that_the_cell_states(tmp_path, monkeypatch, example):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    stated, before = 150, (5000.0, 4000.0, 300.0, 250.0, 200.0, 99.0)
+    with touched(f"{example}.toml") as cell:
+        files = tmp_path / "robolink.toml"
+        confirmed = 'remote_timeout_s = 60\nremote_timeout_confirmed_by = "a test"\n'
+        lines = f'[cells.a]\nurl = "{cell.url}"\n{confirmed}acceleration_mm_s2 = {stated}\n'
+        files.write_text(lines, encoding="utf-8")
+        monkeypatch.setenv("ROBOLINK_CONFIG", str(files))
+        cell.simulator.machine.parameters.accel_s = before
+        done = replace(cell, url="a").change(*cell.words)
+        assert done.code == 0, done.out
+        log = list(cell.simulator.log)
+        assert cell.simulator.machine.parameters.accel_s == before
+    assert movements(log) > 20
+    assert broken_promises(log, replace(SPEEDS[example], mm_s2=stated)) == []
+    assert sum('"AccelS ' in text for _, _, text in log) == 2
+    requests = sum(direction == ">" for _, direction, _ in log)
+    assert requests <= MOST_REQUESTS.get(example, requests)
 
 
 @pytest.fixture(scope="module")

@@ -98,6 +98,15 @@ def test_an_entry_point_leads_from_its_url_to_it(server, monkeypatch, name):
     assert "HALT" in server.asked
 
 
+def test_a_kind_that_keeps_to_no_acceleration_is_read_and_never_moved(server, monkeypatch):
+    install(monkeypatch, ("bench", "bench_package.bench_controller:open_bench"))
+    with pytest.raises(ConfigError, match="cannot limit the acceleration") as refusal:
+        robolink.connect(server.url, acceleration_mm_s2=150)
+    assert "acceleration_mm_s2" in refusal.value.remedy
+    with robolink.connect(server.url, acceleration_mm_s2=150, glance=True) as controller:
+        assert controller.tools.read(1) == ToolOffset(12.0, -3.5, -20.0)
+
+
 def test_what_nobody_brings_or_cannot_be_loaded_is_said(server, monkeypatch):
     with pytest.raises(ConfigError, match="'bench'"):
         robolink.connect(server.url)

@@ -191,6 +191,36 @@ def test_what_belongs_together_is_checked_together(tmp_path, lines, where, what)
     assert found[f"cells.a.{where}"].startswith(what)
 
 
+@pytest.mark.parametrize(
+    ("stated", "what"),
+    [
+        ("99", "must be at least 100"),
+        ("35001", "must be at most 35000"),
+        ("150.5", "must be a whole number"),
+        ("true", "must be a whole number"),
+        ('"150"', "must be a whole number"),
+    ],
+)
+def test_an_acceleration_is_a_whole_number_in_its_range(tmp_path, stated, what):
+    lines = f'url = "{URL}"\nacceleration_mm_s2 = {stated}\n'
+    assert problems(tmp_path, f"[cells.a]\n{lines}") == {"cells.a.acceleration_mm_s2": what}
+
+
+def test_a_kind_that_robolink_does_not_move_keeps_to_no_acceleration(tmp_path, places):
+    plc = 'url = "plc+modbus-tcp://192.0.2.3?map=machine.toml"\n'
+    stated = "acceleration_mm_s2 = 150\n"
+    (what,) = problems(tmp_path, f"[cells.a]\n{plc}{stated}").values()
+    assert "robolink does not move controllers of this kind" in what
+    # In two files, neither of which is wrong by itself.
+    places["site"].write_text(f"[cells.a]\n{plc}")
+    places["user"].write_text(f"[cells.a]\n{stated}")
+    with pytest.raises(ConfigError, match=r"cells\.a\.acceleration_mm_s2: cannot apply"):
+        find_cell("a")
+    for url in (URL, "softmotion+modbus-tcp://192.0.2.3", "acme+usb://17"):
+        places["site"].write_text(f'[cells.a]\nurl = "{url}"\n')
+        assert find_cell("a").settings.acceleration_mm_s2 == 150
+
+
 @pytest.mark.parametrize("name", ["a b", "epson+tcp", "a/b", "a:b", ""])
 def test_a_name_that_could_be_a_url_is_no_cell(tmp_path, name):
     found = problems(tmp_path, f'[cells."{name}"]\nurl = "{URL}"\n')

@@ -32,6 +32,11 @@ def link_options(cell: "Cell") -> dict[str, Any]:
     return said
 
 
+def acceleration_of(cell: "Cell | None") -> int | None:
+    """Return the highest acceleration that a cell states; a URL alone states none."""
+    return None if cell is None else cell.settings.acceleration_mm_s2
+
+
 def with_cell_limits(
     cell: "Cell | None", options: Mapping[str, Any], keys: Mapping[str, str]
 ) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from robolink.controller_outcome import UNTOUCHED, ControllerOutcome, note_outco
 from robolink.errors import ConfigError, ControllerError, OutcomeUnknownError, RobolinkError
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import joined, tr
-from robolink_cli.access.cell import require_expected_robot
+from robolink_cli.access.cell import acceleration_of, require_expected_robot
 from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
@@ -88,6 +88,7 @@ def open_controller(
             password=password,
             timeout_s=context.timeout_s,
             remote_timeout_s=context.remote_timeout_s,
+            acceleration_mm_s2=acceleration_of(context.cell),
             wait_s=context.wait_s,
             trace=trace,
             signature=signature,

@@ -1,5 +1,11 @@
-"""The meaning of the controller's answers: refusals, status flags, commands not sent."""
+"""The meaning of the controller's answers: refusals, status flags, commands not sent.
 
+What a look before a movement shows, and what was in force before a procedure.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.errors import (
@@ -8,7 +14,8 @@ from robolink.errors import (
     RejectedError,
 )
 from robolink.messages import tr
-from robolink.model import ControllerStatus
+from robolink.model import ControllerStatus, MotionProfile, Path
+from robolink.protocols import spel
 from robolink.protocols.epson_text import ErrorCode, Refusal, StatusFlags
 
 NOT_EXECUTED = frozenset({10, 11, 12, 13, 14, 15, 16, 20, 21})
@@ -180,3 +187,97 @@ def _occupied(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | Non
             tr("Wait until it has started, then try again."),
         )
     return None
+
+
+_SLACK: Final = 0.0005
+"""Half the last digit that is sent and printed, in mm/s and mm/s^2."""
+
+
+def alike(one: Sequence[float], other: Sequence[float]) -> bool:
+    """Return whether a controller would print both alike."""
+    return len(one) == len(other) and all(
+        abs(a - b) <= _SLACK for a, b in zip(one, other, strict=True)
+    )
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return numbers in one line, for a person."""
+    return ", ".join(f"{value:g}" for value in values)
+
+
+@dataclass(frozen=True, slots=True)
+class PowerAndSpeed:
+    """What was in force (docs/reference/spel.md 7.2).
+
+    Attributes:
+        power_high: Whether the power mode was high.
+        speed_percent: Speed, with its departure and approach values.
+        speed_s_mm_s: SpeedS, likewise.
+        accel_s_mm_s2: AccelS, all six values; ``None`` where the cell states no acceleration, so
+            that robolink sets none.
+    """
+
+    power_high: bool
+    speed_percent: tuple[int, int, int]
+    speed_s_mm_s: tuple[float, float, float]
+    accel_s_mm_s2: tuple[float, ...] | None = None
+
+    def is_shown_by(self, now: "PowerAndSpeed") -> bool:
+        """Return whether a later reading shows the same."""
+        if self.accel_s_mm_s2 is None or now.accel_s_mm_s2 is None:
+            return self == now
+        return replace(now, accel_s_mm_s2=self.accel_s_mm_s2) == self and alike(
+            self.accel_s_mm_s2, now.accel_s_mm_s2
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ArmState:
+    """What a movement depends on, as one look shows it.
+
+    Attributes:
+        tool: The selected tool.
+        motors_on: Whether the motors are on.
+        power_high: Whether the power mode is high.
+        speed_percent: Speed of joint movements.
+        speed_mm_s: SpeedS of straight movements.
+        sensed: Whether the input that is to end the movement is on; ``None`` if there is none.
+        accel_s_mm_s2: AccelS of straight movements, acceleration and deceleration; ``None`` where
+            the cell states none, so that it is not read.
+    """
+
+    tool: int
+    motors_on: bool
+    power_high: bool
+    speed_percent: int
+    speed_mm_s: float
+    sensed: bool | None = None
+    accel_s_mm_s2: tuple[float, float] | None = None
+
+    def differences(
+        self, profile: MotionProfile, acceleration_mm_s2: float | None = None
+    ) -> Iterator[spel.Statement]:
+        """Yield what would make a movement one in Power Low, with the speed of its profile.
+
+        A straight movement goes by SpeedS and AccelS, a joint movement by Speed
+        (docs/reference/spel.md 7.2).
+
+        Args:
+            profile: The movement.
+            acceleration_mm_s2: The highest acceleration of straight movements, where one is stated.
+        """
+        if self.power_high:
+            yield spel.power_low()
+        if profile.path is Path.STRAIGHT:
+            if abs(self.speed_mm_s - profile.speed_mm_s) > _SLACK:
+                yield spel.speed_s(profile.speed_mm_s)
+            highest_mm_s2 = math.inf if acceleration_mm_s2 is None else acceleration_mm_s2
+            if max(self.accel_s_mm_s2 or (0.0,)) > highest_mm_s2 + _SLACK:
+                yield from self.lowered(acceleration_mm_s2)
+        elif self.speed_percent != profile.speed_percent:
+            yield spel.speed(profile.speed_percent)
+
+    def lowered(self, acceleration_mm_s2: float | None) -> Iterator[spel.Statement]:
+        """Yield what sets the stated acceleration, and raises neither of the values found."""
+        if self.accel_s_mm_s2 is not None and acceleration_mm_s2 is not None:
+            yield spel.accel_s(*(min(each, acceleration_mm_s2) for each in self.accel_s_mm_s2))

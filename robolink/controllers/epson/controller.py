@@ -74,6 +74,8 @@ class EpsonController(ControllerCore):
         outcomes: Where doubtful outcomes of this controller are kept.
         remote_timeout_s: The remote time-out set on the controller, as a person states it;
             0 (never) forbids motion.
+        acceleration_mm_s2: Highest acceleration of straight movements, as the cell states it;
+            ``None`` leaves AccelS alone.
 
     Example:
         >>> from robolink.controllers import EpsonController
@@ -93,6 +95,7 @@ class EpsonController(ControllerCore):
         motion=True,
         motors=True,
         low_power=True,
+        acceleration=True,
         looks=True,
         io=True,
         points=True,
@@ -103,10 +106,18 @@ class EpsonController(ControllerCore):
     groups: tuple[EpsonGroup]
 
     def __init__(
-        self, session: EpsonSession, outcomes: OutcomeLog, *, remote_timeout_s: float
+        self,
+        session: EpsonSession,
+        outcomes: OutcomeLog,
+        *,
+        remote_timeout_s: float,
+        acceleration_mm_s2: int | None = None,
     ) -> None:
         link = self._link = EpsonLink(session, outcomes)
-        self.groups = (EpsonGroup(link, remote_timeout_s=remote_timeout_s),)
+        group = EpsonGroup(
+            link, remote_timeout_s=remote_timeout_s, acceleration_mm_s2=acceleration_mm_s2
+        )
+        self.groups = (group,)
         super().__init__(link, capabilities=self.OF_KIND, tools=EpsonToolTable(link))
 
     @cached_property
@@ -364,6 +375,7 @@ def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
             password=terms.password,
             timeout_s=terms.timeout_s,
             remote_timeout_s=terms.remote_timeout_s,
+            acceleration_mm_s2=terms.acceleration_mm_s2,
         )
     except LoginUnansweredError:
         # The controller serves one client at a time (docs/reference/epson.md 1.1). The lease may
@@ -380,6 +392,7 @@ def open_epson(
     password: Secret | None = None,
     timeout_s: float = 3.0,
     remote_timeout_s: float = 60.0,
+    acceleration_mm_s2: int | None = None,
 ) -> EpsonController:
     """Log in and return the controller; the line is closed when that fails.
 
@@ -390,6 +403,8 @@ def open_epson(
         timeout_s: Longest wait for one answer, seconds.
         remote_timeout_s: The remote time-out set on the controller, as a person states it, seconds;
             0 (never) forbids motion.
+        acceleration_mm_s2: Highest acceleration of straight movements, as the cell states it;
+            ``None`` leaves AccelS alone.
 
     Raises:
         LoginRefusedError: Wrong or missing password. One attempt is made.
@@ -406,7 +421,12 @@ def open_epson(
         15
     """
     session = log_in(line, password, timeout_s=timeout_s)
-    return EpsonController(session, outcomes, remote_timeout_s=remote_timeout_s)
+    return EpsonController(
+        session,
+        outcomes,
+        remote_timeout_s=remote_timeout_s,
+        acceleration_mm_s2=acceleration_mm_s2,
+    )
 
 
 def _typed_statement(text: str) -> Statement:

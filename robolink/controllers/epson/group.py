@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Final
 
+from robolink.controllers.epson.answers import ArmState
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.movement import (
     EpsonMotion,
@@ -39,17 +40,20 @@ class EpsonGroup(MotionGroupCore):
     """The robot that the controller's Execute acts on.
 
     Attributes:
-        settings: Power and speed of this robot.
+        settings: Power, speed and acceleration of this robot.
 
     Args:
         link: The controller.
         remote_timeout_s: The remote time-out set on it, as a person states it.
+        acceleration_mm_s2: Highest acceleration of straight movements, where the cell states one.
     """
 
-    def __init__(self, link: EpsonLink, *, remote_timeout_s: float) -> None:
+    def __init__(
+        self, link: EpsonLink, *, remote_timeout_s: float, acceleration_mm_s2: int | None = None
+    ) -> None:
         super().__init__(link)
         self._link = link
-        self.settings = Settings(link)
+        self.settings = Settings(link, acceleration_mm_s2=acceleration_mm_s2)
         self._remote_timeout_s = remote_timeout_s
         self._current: EpsonMotion | None = None
 
@@ -78,7 +82,8 @@ class EpsonGroup(MotionGroupCore):
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> EpsonMotion:
         """Start one movement; see :class:`robolink.model.MotionGroup`."""
         require_target(target, box, profile)
-        return self._start(target, profile, self._statement_for(target, profile))
+        motion, _ = self._start(target, profile, self._statement_for(target, profile))
+        return motion
 
     def move_until_input(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
@@ -87,8 +92,8 @@ class EpsonGroup(MotionGroupCore):
         require_target(target, box)
         statement = self._statement_until(target, edge)
         profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
-        motion = self._start(target, profile, statement, edge)
-        return EpsonMotionUntilInput(motion, edge, self._link)
+        motion, found = self._start(target, profile, statement, edge)
+        return EpsonMotionUntilInput(motion, edge, self._link, found.accel_s_mm_s2)
 
     def requests_until(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float
@@ -100,7 +105,7 @@ class EpsonGroup(MotionGroupCore):
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return the most that :meth:`move_to` would send besides its reads, as sent on the wire.
 
-        Power and speed are sent only where a look shows that they differ.
+        Power, speed and acceleration are sent only where a look shows that they differ.
         """
         return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
 
@@ -113,14 +118,19 @@ class EpsonGroup(MotionGroupCore):
         return singular.obstacle(self._flagged(target), path, begin)
 
     def deceleration_mm_s2(self) -> float:
-        """Read AccelS: ``Till`` brakes with it (docs/reference/spel.md 7.1)."""
-        return spel.parse_number(self._link.window.printed(spel.print_braking()))
+        """Read AccelS, or less where the cell states it: ``Till`` brakes with it.
+
+        Source: docs/reference/spel.md 7.1.
+        """
+        _, braking_mm_s2 = self.settings.acceleration_mm_s2()
+        return braking_mm_s2
 
     def run_up_mm(self, speed_mm_s: float) -> float:
-        """Read AccelS, the less of both: straight movements speed up and brake with it."""
-        window = self._link.window
-        faster = spel.parse_number(window.printed(spel.print_speeding_up()))
-        return speed_mm_s**2 / (2 * min(faster, self.deceleration_mm_s2()))
+        """Read AccelS, the less of both, or less where the cell states it.
+
+        Straight movements speed up and brake with it.
+        """
+        return speed_mm_s**2 / (2 * min(self.settings.acceleration_mm_s2()))
 
     def edge_step_mm(self, speed_mm_s: float) -> float:  # noqa: ARG002 - only the printed digits matter
         """Return the last digit of a position as it is printed."""
@@ -197,11 +207,12 @@ class EpsonGroup(MotionGroupCore):
         profile: MotionProfile,
         statement: spel.Statement,
         edge: InputEdge | None = None,
-    ) -> EpsonMotion:
+    ) -> tuple[EpsonMotion, ArmState]:
+        """Start a movement, and return it with what the last look before it showed."""
         link, window = self._link, self._link.window
         try:
             with link.lock.held(statement):
-                # Checked before power and speed are set for the movement.
+                # Checked before anything is set for the movement.
                 link.markers.require_settled(statement)
                 self._require_supervision()
                 with window.proving_ready(statement):
@@ -220,9 +231,10 @@ class EpsonGroup(MotionGroupCore):
                 if edge is not None:
                     on = bool(found.sensed)
                     edge.require_ahead(on, controller=link.identity, request=statement)
+                    self.settings.require_as_told(found, statement)
                 with link.uninterrupted():
-                    self._current = self._started(target, statement, found.tool)
-                return self._current
+                    self._current = motion = self._started(target, statement, found.tool)
+                return motion, found
         except (KeyboardInterrupt, StoppedError):
             # The caller gets no motion object to wait on.
             self.abort_unfinished()

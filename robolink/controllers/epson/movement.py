@@ -4,19 +4,20 @@ A straight movement until an input switches: ``Move ... Till`` or ``Find``.
 
 Source: docs/reference/spel.md 7.1.
 
-Power and speed: set and read back, remembered and put back.
+Power, speed and acceleration: set and read back, remembered and put back.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Final
 
+from robolink.controllers.epson.answers import ArmState, PowerAndSpeed, alike, numbers
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.session import PendingExecute
 from robolink.controllers.epson.singularities import printed_pose, read_position
 from robolink.controllers.motion_group import not_ended_in_time, stopped_before_edge
 from robolink.errors import (
+    ControllerError,
     ControllerFaultError,
     NotReadyError,
     NotReadyReason,
@@ -28,7 +29,7 @@ from robolink.errors import (
     UnclearAnswerError,
 )
 from robolink.messages import tr
-from robolink.model import InputEdge, Marker, MotionOutcome, MotionProfile, Path, Pose
+from robolink.model import InputEdge, Marker, MotionOutcome, MotionProfile, Pose
 from robolink.protocols import spel
 from robolink.protocols.epson_text import ErrorCode, Refusal
 from robolink.timing import Deadline
@@ -190,98 +191,153 @@ class EpsonMotionUntilInput:
 
     With ``run_on`` the position is the one that ``Find`` kept at the edge. Without, ``Till``
     keeps none: it is the measured position at rest, past the edge by the way of braking.
+
+    Args:
+        motion: The movement.
+        edge: What ends it.
+        link: The controller.
+        accel_s_mm_s2: AccelS as the look before it showed it; ``None`` where no look shows it.
     """
 
-    def __init__(self, motion: EpsonMotion, edge: InputEdge, link: EpsonLink) -> None:
+    def __init__(
+        self,
+        motion: EpsonMotion,
+        edge: InputEdge,
+        link: EpsonLink,
+        accel_s_mm_s2: tuple[float, float] | None = None,
+    ) -> None:
         self._motion = motion
         self._edge = edge
         self._link = link
+        self._accel_s_mm_s2 = accel_s_mm_s2
 
     def wait(self, *, timeout_s: float) -> Pose | None:
-        """Wait for the end; see :class:`robolink.model.MotionUntilInput`."""
+        """Wait for the end; see :class:`robolink.model.MotionUntilInput`.
+
+        Raises:
+            ControllerError: AccelS is not what it was before, so that nobody knows how fast the tip
+                was at the edge.
+        """
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
             raise stopped_before_edge(self._link.identity, self._motion.statement)
         window, tool = self._link.window, spel.print_selected_tool()
+        accel = () if self._accel_s_mm_s2 is None else _ACCEL_S
         if self._edge.run_on:
             # FindPos of nothing found is an error of the controller (docs/reference/spel.md 7.1).
-            (met,) = window.printed_numbers(spel.print_position_found())
+            met, *now = window.printed_numbers(spel.print_position_found(), *accel)
+            self._require_kept(now)
             if not spel.parse_boolean(met):
                 return None
             return read_position(window, spel.print_found_position())
-        (met, selected), point = window.printed_before_point(
-            spel.print_till_on(), tool, point=spel.print_real_position()
+        (met, selected, *now), point = window.printed_before_point(
+            spel.print_till_on(), tool, *accel, point=spel.print_real_position()
         )
+        self._require_kept(now)
         if not spel.parse_boolean(met):
             return None
         return printed_pose(point, tool=spel.parse_integer(selected))
 
+    def _require_kept(self, printed: Iterable[str]) -> None:
+        now, before = tuple(map(spel.parse_number, printed)), self._accel_s_mm_s2 or ()
+        if not alike(now, before):
+            raise ControllerError(
+                tr(
+                    "The acceleration changed during the movement: AccelS is {now} now, and was "
+                    "{before}.",
+                    now=numbers(now),
+                    before=numbers(before),
+                ),
+                remedy=tr(
+                    "The measurement does not count. Find the program or person that sets AccelS, "
+                    "then measure again."
+                ),
+                controller=self._link.identity,
+                request=self._motion.statement,
+            )
 
-_SLACK = 0.0005
 
-
-@dataclass(frozen=True, slots=True)
-class PowerAndSpeed:
-    """What was in force: power, Speed (percent) and SpeedS (mm/s), each with its
-    departure and approach values (docs/reference/spel.md 7.2).
-    """  # noqa: D205 - one sentence over two lines
-
-    power_high: bool
-    speed_percent: tuple[int, int, int]
-    speed_s_mm_s: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class ArmState:
-    """What a movement depends on, as one look shows it.
-
-    Attributes:
-        tool: The selected tool.
-        motors_on: Whether the motors are on.
-        power_high: Whether the power mode is high.
-        speed_percent: Speed of joint movements.
-        speed_mm_s: SpeedS of straight movements.
-        sensed: Whether the input that is to end the movement is on; ``None`` if there is none.
-    """
-
-    tool: int
-    motors_on: bool
-    power_high: bool
-    speed_percent: int
-    speed_mm_s: float
-    sensed: bool | None = None
-
-    def differences(self, profile: MotionProfile) -> Iterator[spel.Statement]:
-        """Yield what would make a movement one in Power Low, with the speed of its profile.
-
-        A straight movement goes by SpeedS, a joint movement by Speed (docs/reference/spel.md 7.2).
-        """
-        if self.power_high:
-            yield spel.power_low()
-        if profile.path is Path.STRAIGHT:
-            if abs(self.speed_mm_s - profile.speed_mm_s) > _SLACK:
-                yield spel.speed_s(profile.speed_mm_s)
-        elif self.speed_percent != profile.speed_percent:
-            yield spel.speed(profile.speed_percent)
+_ACCEL_S: Final = (spel.print_accel_s(1), spel.print_accel_s(2))
+_ALL_ACCEL_S: Final = tuple(map(spel.print_accel_s, range(1, 7)))
 
 
 class Settings:
-    """Reads, limits and restores power and speed."""
+    """Reads, limits and restores power, speed and acceleration.
 
-    def __init__(self, link: EpsonLink) -> None:
+    Args:
+        link: The controller.
+        acceleration_mm_s2: Highest acceleration and deceleration of straight movements, as the cell
+            states it. It is only ever lowered to this; ``None`` leaves AccelS alone.
+    """
+
+    def __init__(self, link: EpsonLink, *, acceleration_mm_s2: int | None = None) -> None:
         self._link = link
         self._window = link.window
         self._set_after = link.session.settings_reset
+        self._stated_mm_s2 = acceleration_mm_s2
+        self._told: tuple[float, float] | None = None
 
-    def read(self) -> PowerAndSpeed:
-        """Read the present power and speed."""
+    def read(self, like: PowerAndSpeed | None = None) -> PowerAndSpeed:
+        """Read the present power and speed, and the acceleration where the cell states one.
+
+        Args:
+            like: An earlier reading, perhaps of another process; what that holds is read.
+        """
         each = (1, 2, 3)
+        wanted = self._stated_mm_s2 if like is None else like.accel_s_mm_s2
         told = self._window.printed_numbers(
-            spel.print_power(), *map(spel.print_speed, each), *map(spel.print_speed_s, each)
+            spel.print_power(),
+            *map(spel.print_speed, each),
+            *map(spel.print_speed_s, each),
+            *(() if wanted is None else _ALL_ACCEL_S),
         )
         power, a, b, c, *straight = told
-        d, e, f = map(spel.parse_number, straight)
+        d, e, f, *accel = map(spel.parse_number, straight)
         percent = (spel.parse_integer(a), spel.parse_integer(b), spel.parse_integer(c))
-        return PowerAndSpeed(spel.parse_integer(power) != 0, percent, (d, e, f))
+        high = spel.parse_integer(power) != 0
+        return PowerAndSpeed(high, percent, (d, e, f), tuple(accel) or None)
+
+    def acceleration_mm_s2(self) -> tuple[float, float]:
+        """Read how a straight movement will speed up and brake: AccelS, or less where stated.
+
+        Where the cell states one, a movement that an input ends is refused from here on if AccelS
+        is another by then (:meth:`require_as_told`).
+        """
+        found = self._window.printed_numbers(*_ACCEL_S)
+        speeding_up, braking = map(spel.parse_number, found)
+        if self._stated_mm_s2 is not None:
+            speeding_up = min(speeding_up, self._stated_mm_s2)
+            braking = min(braking, self._stated_mm_s2)
+        self._told = speeding_up, braking
+        return self._told
+
+    def require_as_told(self, found: ArmState, request: str) -> None:
+        """Refuse a movement with another acceleration than the one that was told last.
+
+        The run-up of a crossing and the braking of a touch were calculated from that one.
+
+        Args:
+            found: What the last look showed.
+            request: The movement.
+
+        Raises:
+            NotReadyError: Names both.
+        """
+        now, told = found.accel_s_mm_s2, self._told
+        if now is None or told is None or alike(now, told):
+            return
+        raise NotReadyError(
+            tr(
+                "The run-up was calculated for an AccelS of {told}; now it is {now}.",
+                told=numbers(told),
+                now=numbers(now),
+            ),
+            reason=NotReadyReason.ACCELERATION,
+            remedy=tr(
+                "Nothing moved. Find the program or person that sets AccelS, then start again."
+            ),
+            controller=self._link.identity,
+            request=request,
+        )
 
     def look(self, edge: InputEdge | None = None) -> ArmState:
         """Read what a movement depends on.
@@ -293,14 +349,17 @@ class Settings:
             edge: What is to end it. Its input is read through Execute, so that it shows what the
                 next statement will see.
         """
-        tool, motor, power, percent, straight, *sensed = self._window.printed_numbers(
+        accel = () if self._stated_mm_s2 is None else _ACCEL_S
+        tool, motor, power, percent, straight, *more = self._window.printed_numbers(
             spel.print_selected_tool(),
             spel.print_motor(),
             spel.print_power(),
             spel.print_speed(1),
             spel.print_speed_s(1),
+            *accel,
             *([spel.print_input(edge.number)] if edge else []),
         )
+        found, sensed = more[: len(accel)], more[len(accel) :]
         return ArmState(
             tool=spel.parse_integer(tool),
             motors_on=spel.parse_integer(motor) != 0,
@@ -308,18 +367,32 @@ class Settings:
             speed_percent=spel.parse_integer(percent),
             speed_mm_s=spel.parse_number(straight),
             sensed=spel.parse_integer(sensed[0]) != 0 if sensed else None,
+            accel_s_mm_s2=(
+                (spel.parse_number(found[0]), spel.parse_number(found[1])) if found else None
+            ),
         )
 
-    def statements(self, profile: MotionProfile) -> tuple[spel.Statement, ...]:
-        """Return what sets Power Low and both speeds of a profile."""
+    def statements(
+        self, profile: MotionProfile, found: ArmState | None = None
+    ) -> tuple[spel.Statement, ...]:
+        """Return what sets Power Low, both speeds of a profile, and the acceleration if stated.
+
+        Args:
+            profile: The movement.
+            found: What a look showed; without one the acceleration is the stated one, which is the
+                most that is ever set.
+        """
+        stated = self._stated_mm_s2
+        accel = () if stated is None else (spel.accel_s(stated, stated),)
         return (
             spel.power_low(),
             spel.speed(profile.speed_percent),
             spel.speed_s(profile.speed_mm_s),
+            *(accel if found is None else found.lowered(stated)),
         )
 
     def slow_down(self, profile: MotionProfile, edge: InputEdge | None = None) -> ArmState:
-        """Set Power Low and both speeds of a profile, and confirm it with a look.
+        """Set Power Low, both speeds and the acceleration, and confirm it with a look.
 
         Args:
             profile: The movement.
@@ -330,7 +403,9 @@ class Settings:
         """
         # Counted before: what another thread stops meanwhile is set anew once more.
         resets = self._link.session.settings_reset
-        state = self._confirmed(profile, self.statements(profile), edge)
+        # An acceleration is only lowered, so it takes a reading from after the reset.
+        found = None if self._stated_mm_s2 is None else self.look()
+        state = self._confirmed(profile, self.statements(profile, found), edge)
         self._set_after = resets
         return state
 
@@ -354,7 +429,7 @@ class Settings:
         """
         if self._set_after != self._link.session.settings_reset:
             return self.slow_down(profile, edge)
-        differences = tuple(found.differences(profile))
+        differences = tuple(found.differences(profile, self._stated_mm_s2))
         if not differences and edge is None:
             return found
         return self._confirmed(profile, differences, edge)
@@ -368,7 +443,18 @@ class Settings:
         for statement in statements:
             self._window.command(statement)
         state = self.look(edge)
-        if any(state.differences(profile)):
+        left = tuple(state.differences(profile, self._stated_mm_s2))
+        if left and left[0].startswith("AccelS"):
+            raise NotReadyError(
+                tr("The controller does not confirm the acceleration that was set."),
+                reason=NotReadyReason.ACCELERATION,
+                remedy=tr(
+                    "Nothing moved. Find the program or person that sets AccelS, then start again."
+                ),
+                controller=self._link.identity,
+                request=left[0],
+            )
+        if left:
             raise NotReadyError(
                 tr("The controller does not confirm low power and the speed that was set."),
                 reason=NotReadyReason.HIGH_POWER,
@@ -384,21 +470,26 @@ class Settings:
         Raises:
             NotReadyError: Another value is read back.
         """
-        if self.read() == before:
+        if before.is_shown_by(self.read(before)):
             return
         for statement in (
             spel.speed(*before.speed_percent),
             spel.speed_s(*before.speed_s_mm_s),
             spel.power_high() if before.power_high else spel.power_low(),
+            *([spel.accel_s(*before.accel_s_mm_s2)] if before.accel_s_mm_s2 else []),
         ):
             # One garbled acknowledgement must not prevent the rest from being restored.
             with suppress(UnclearAnswerError):
                 self._window.command(statement)
-        if self.read() != before:
+        if not before.is_shown_by(self.read(before)):
             raise NotReadyError(
-                tr("robolink could not restore the previous power mode and speed."),
+                tr("robolink could not restore the previous power mode, speed and acceleration.")
+                if before.accel_s_mm_s2
+                else tr("robolink could not restore the previous power mode and speed."),
                 reason=NotReadyReason.HIGH_POWER,
-                remedy=tr("Check Power, Speed and SpeedS before you start the cell."),
+                remedy=tr("Check Power, Speed, SpeedS and AccelS before you start the cell.")
+                if before.accel_s_mm_s2
+                else tr("Check Power, Speed and SpeedS before you start the cell."),
                 controller=self._link.identity,
             )
 

@@ -1,4 +1,4 @@
-"""Restores what a procedure changed: the tool, the power mode and the speed.
+"""Restores what a procedure changed: the tool, the power mode, the speed, the acceleration.
 
 Settles what an earlier process left open on an EPSON controller.
 
@@ -8,9 +8,9 @@ Judges the open marker of an output, a memory bit or a variable by reading it.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from robolink.controllers.epson.answers import PowerAndSpeed, numbers
 from robolink.controllers.epson.group import EpsonGroup
 from robolink.controllers.epson.link import EpsonLink
-from robolink.controllers.epson.movement import PowerAndSpeed
 from robolink.controllers.epson.tools import EpsonToolTable
 from robolink.controllers.epson.values import EpsonIo, EpsonVariables, equal_values
 from robolink.controllers.preserving import Preserver, not_understood
@@ -31,20 +31,25 @@ class InForce:
 
     def to_details(self) -> dict[str, object]:
         """Return plain values for a marker."""
+        accel_s = self.settings.accel_s_mm_s2
         return {
             "tool": self.tool,
             "now": self.tool,
             "power_high": self.settings.power_high,
             "speed_percent": list(self.settings.speed_percent),
             "speed_s_mm_s": list(self.settings.speed_s_mm_s),
+            **({} if accel_s is None else {"accel_s_mm_s2": list(accel_s)}),
         }
 
     def shown(self) -> str:
         """Return it in one line, as the controller's own words."""
-        power = "High" if self.settings.power_high else "Low"
-        speeds = (self.settings.speed_percent, self.settings.speed_s_mm_s)
-        speed, speed_s = (", ".join(f"{value:g}" for value in values) for values in speeds)
-        return f"Tool {self.tool}, Power {power}, Speed {speed}, SpeedS {speed_s}"
+        settings = self.settings
+        power = "High" if settings.power_high else "Low"
+        speed, speed_s = numbers(settings.speed_percent), numbers(settings.speed_s_mm_s)
+        shown = f"Tool {self.tool}, Power {power}, Speed {speed}, SpeedS {speed_s}"
+        if settings.accel_s_mm_s2 is not None:
+            shown += f", AccelS {numbers(settings.accel_s_mm_s2)}"
+        return shown
 
     @classmethod
     def from_marker(cls, marker: Marker) -> "InForce":
@@ -57,19 +62,27 @@ class InForce:
             details = marker.details
             tool, high = details["tool"], details["power_high"]
             speed, speed_s = details["speed_percent"], details["speed_s_mm_s"]
+            # Markers of cells that state no acceleration, and those of before, have none.
+            accel_s = details.get("accel_s_mm_s2", [])
             if not (
-                isinstance(tool, int) and isinstance(speed, list) and isinstance(speed_s, list)
+                isinstance(tool, int)
+                and isinstance(speed, list)
+                and isinstance(speed_s, list)
+                and isinstance(accel_s, list)
             ):
                 raise TypeError
+            if len(accel_s) not in (0, 6):
+                raise ValueError
             a, b, c = (int(value) for value in speed)
             d, e, f = (float(value) for value in speed_s)
+            accel = tuple(float(value) for value in accel_s) or None
         except (KeyError, TypeError, ValueError) as error:
             raise not_understood(marker) from error
-        return cls(tool, PowerAndSpeed(bool(high), (a, b, c), (d, e, f)))
+        return cls(tool, PowerAndSpeed(bool(high), (a, b, c), (d, e, f), accel))
 
 
 class EpsonPreserver(Preserver):
-    """Restores the selected tool, and power and speed with it."""
+    """Restores the selected tool, and with it power, speed, and the acceleration where stated."""
 
     def __init__(self, link: EpsonLink, tools: EpsonToolTable, group: EpsonGroup) -> None:
         super().__init__(link, tools, (group,))
@@ -115,13 +128,23 @@ class EpsonPreserver(Preserver):
         self._settings.restore(InForce.from_marker(marker).settings)
 
     def _restored_more(self, marker: Marker) -> bool:
-        return self._settings.read() == InForce.from_marker(marker).settings
+        before = InForce.from_marker(marker).settings
+        return before.is_shown_by(self._settings.read(before))
 
     def _action(self, marker: Marker, now: int | None) -> str:
-        tool = InForce.from_marker(marker).tool
-        if now == tool:
-            return tr("Restore power mode and speed")
-        return tr("Select tool {tool} again, with the earlier power mode and speed", tool=tool)
+        before = InForce.from_marker(marker)
+        if before.settings.accel_s_mm_s2 is None:
+            if now == before.tool:
+                return tr("Restore power mode and speed")
+            return tr(
+                "Select tool {tool} again, with the earlier power mode and speed", tool=before.tool
+            )
+        if now == before.tool:
+            return tr("Restore power mode, speed and acceleration")
+        return tr(
+            "Select tool {tool} again, with the earlier power mode, speed and acceleration",
+            tool=before.tool,
+        )
 
 
 class PendingValues:

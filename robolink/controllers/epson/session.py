@@ -50,10 +50,12 @@ from robolink.timing import AnswerTimes, Deadline
 _CALM: Final = frozenset({"stop", "abort", "pause", "resetalm", "setmotorsoff"})
 _SESSION: Final = frozenset({"login", "logout"})
 _SETS_BACK: Final = frozenset({"abort", "reset", "setmotorson"})
-"""Requests that put power and speed back, or may (docs/reference/spel.md 6.3)."""
+"""Requests that put power, speed and acceleration back, or may (docs/reference/spel.md 6.3)."""
 
 _LOOKS: Final = re.compile(r"(Print .*|Where|TLSet|Base|Here|RealPos)", re.ASCII)
-_RESTORES: Final = re.compile(r"(Tool [0-9]+|Power (Low|High)|SpeedS? [0-9., ]+)", re.ASCII)
+_RESTORES: Final = re.compile(
+    r"(Tool [0-9]+|Power (Low|High)|(SpeedS?|AccelS) [0-9., ]+)", re.ASCII
+)
 _WRITES: Final = re.compile(r"(TLSet [0-9]+, XY\([^()]*\)|TLClr [0-9]+)", re.ASCII)
 
 

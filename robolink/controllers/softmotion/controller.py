@@ -82,21 +82,46 @@ class SoftMotionController(ControllerCore):
     Args:
         mailbox: The mailbox.
         images: What is known of the machine builder's own kinematics.
+        acceleration_mm_s2: Highest acceleration of straight movements, as the cell states it;
+            ``None`` leaves what robolink sends with each of them.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.controllers import SoftMotionController
+        >>> url = "softmotion+sim://controller-example"
+        >>> with robolink.connect(url, kind=SoftMotionController, acceleration_mm_s2=150) as plc:
+        ...     round(plc.groups[0].run_up_mm(10), 2)  # in mm
+        0.35
     """
 
     OF_KIND: ClassVar = Capabilities(
-        pose_while_moving=True, tool_write=True, motion=True, motors=True, io=True
+        pose_while_moving=True,
+        tool_write=True,
+        motion=True,
+        motors=True,
+        acceleration=True,
+        io=True,
     )
     tools: SoftMotionToolTable
     groups: tuple[SoftMotionGroup]
 
-    def __init__(self, mailbox: Mailbox, images: OrientationImages | None = None) -> None:
+    def __init__(
+        self,
+        mailbox: Mailbox,
+        images: OrientationImages | None = None,
+        *,
+        acceleration_mm_s2: int | None = None,
+    ) -> None:
         self._mailbox = mailbox
-        self.groups = (SoftMotionGroup(mailbox),)
+        self.groups = (SoftMotionGroup(mailbox, acceleration_mm_s2=acceleration_mm_s2),)
         able = mailbox.snapshots.met.capabilities
         moves = Capability.MOTION in able
         offered = replace(
-            self.OF_KIND, tool_write=Capability.TOOLS in able, motion=moves, motors=moves
+            self.OF_KIND,
+            tool_write=Capability.TOOLS in able,
+            motion=moves,
+            motors=moves,
+            acceleration=moves,
         )
         tools = SoftMotionToolTable(mailbox, images)
         super().__init__(mailbox, capabilities=offered, tools=tools)
@@ -290,6 +315,7 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         outcomes=terms.record_of(link),
         timeout_s=terms.timeout_s,
         kinematics=kinematics,
+        acceleration_mm_s2=terms.acceleration_mm_s2,
         tell=terms.tell,
     )
 
@@ -316,6 +342,7 @@ def open_softmotion(
     timeout_s: float = 3.0,
     owner: int = 0,
     kinematics: str | tuple[object, ...] = (),
+    acceleration_mm_s2: int | None = None,
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> SoftMotionController:
     """Connect to the mailbox and return the controller; the link is closed if that fails.
@@ -329,6 +356,7 @@ def open_softmotion(
         owner: This client's token; by default one that nobody else has.
         kinematics: The machine builder's own, as ``module:Class`` or as objects, so that a tool
             that it cannot carry is refused before it is written (docs/custom-kinematics.md).
+        acceleration_mm_s2: Highest acceleration of straight movements, as the cell states it.
         tell: Told, in sentences, what is waited for.
 
     Raises:
@@ -352,7 +380,8 @@ def open_softmotion(
             snapshots.meet()
             device_id = read_device_id(wire)
             mailbox = Mailbox(wire, snapshots, outcomes, device_id=device_id, tell=tell)
-            return SoftMotionController(mailbox, OrientationImages(kinematics))
+            images = OrientationImages(kinematics)
+            return SoftMotionController(mailbox, images, acceleration_mm_s2=acceleration_mm_s2)
     except BaseException:
         wire.close()
         raise

@@ -58,10 +58,16 @@ from robolink.protocols.mailbox import (
 
 
 class SoftMotionGroup(MotionGroupCore):
-    """One axis group. Its poses are those of the selected tool in the machine frame (MCS)."""
+    """One axis group. Its poses are those of the selected tool in the machine frame (MCS).
 
-    def __init__(self, mailbox: Mailbox) -> None:
+    Args:
+        mailbox: The mailbox.
+        acceleration_mm_s2: Highest acceleration of straight movements, where the cell states one.
+    """
+
+    def __init__(self, mailbox: Mailbox, *, acceleration_mm_s2: int | None = None) -> None:
         super().__init__(mailbox)
+        self._stated_mm_s2 = acceleration_mm_s2
         self._mailbox = mailbox
         self._current: list[SoftMotionMotion] = []
 
@@ -148,7 +154,7 @@ class SoftMotionGroup(MotionGroupCore):
 
     def run_up_mm(self, speed_mm_s: float) -> float:
         """Return the distance of the acceleration and jerk of such a movement."""
-        return run_up_mm(speed_mm_s)
+        return run_up_mm(speed_mm_s, self._stated_mm_s2)
 
     def edge_step_mm(self, speed_mm_s: float) -> float:
         """Return how far it goes in a cycle: the PLC notes an edge once a cycle."""
@@ -301,7 +307,9 @@ class SoftMotionGroup(MotionGroupCore):
             Opcode.MOVE_DIRECT if joint else Opcode.MOVE_LINEAR,
             operands=(0, 0, CoordinateSystem.MCS, BufferMode.BUFFERED),
             pose=self._frame(target),
-            dynamics=dynamics_of(profile, unit_um=self._mailbox.unit_um),
+            dynamics=dynamics_of(
+                profile, unit_um=self._mailbox.unit_um, acceleration_mm_s2=self._stated_mm_s2
+            ),
         )
 
     def _until_draft(self, target: Pose, edge: InputEdge, speed_mm_s: float) -> Command:
@@ -316,7 +324,9 @@ class SoftMotionGroup(MotionGroupCore):
             Opcode.MOVE_UNTIL_INPUT,
             operands=(signed, int(edge.run_on), CoordinateSystem.MCS, BufferMode.BUFFERED),
             pose=self._frame(target),
-            dynamics=up_to_an_edge(speed_mm_s, unit_um=self._mailbox.unit_um),
+            dynamics=up_to_an_edge(
+                speed_mm_s, unit_um=self._mailbox.unit_um, acceleration_mm_s2=self._stated_mm_s2
+            ),
         )
 
     def _frame(self, target: Pose) -> Six:

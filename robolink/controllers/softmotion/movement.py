@@ -413,8 +413,10 @@ def factors(percent: int) -> Four:
     return (percent / 100.0,) * 4
 
 
-def straight(speed_mm_s: float, *, unit_um: float) -> Four:
+def straight(speed_mm_s: float, *, unit_um: float, acceleration_mm_s2: float | None = None) -> Four:
     """Return velocity, acceleration, deceleration and jerk in the PLC's units.
+
+    Acceleration and deceleration are lowered to what the cell states, if it states one.
 
     Raises:
         ConfigError: The speed is not above 0, or not finite.
@@ -425,23 +427,36 @@ def straight(speed_mm_s: float, *, unit_um: float) -> Four:
             remedy=tr("Give a number above 0."),
         )
     velocity = speed_mm_s * _UM_PER_MM / unit_um
-    acceleration = velocity / _RAMP_S
+    acceleration = _kept_to(acceleration_mm_s2, velocity / _RAMP_S, unit_um)
     return (velocity, acceleration, acceleration, acceleration / _RAMP_S)
 
 
-def up_to_an_edge(speed_mm_s: float, *, unit_um: float) -> Four:
+def _kept_to(acceleration_mm_s2: float | None, usual: float, unit_um: float) -> float:
+    """Return an acceleration in the PLC's units, lowered to the one that the cell states."""
+    if acceleration_mm_s2 is None:
+        return usual
+    return min(usual, acceleration_mm_s2 * _UM_PER_MM / unit_um)
+
+
+def up_to_an_edge(
+    speed_mm_s: float, *, unit_um: float, acceleration_mm_s2: float | None = None
+) -> Four:
     """Return the numbers of a movement that an input stops, the tip perhaps in contact.
+
+    The acceleration is lowered to what the cell states, if it states one. The deceleration is not:
+    the tip must not go deeper.
 
     Raises:
         ConfigError: The speed is not above 0, or not finite.
     """
     velocity, *_ = straight(speed_mm_s, unit_um=unit_um)
     deceleration = velocity * speed_mm_s / (2 * _PAST_AN_EDGE_MM)
-    return (velocity, deceleration, deceleration, deceleration / _EDGE_RAMP_S)
+    acceleration = _kept_to(acceleration_mm_s2, deceleration, unit_um)
+    return (velocity, acceleration, deceleration, deceleration / _EDGE_RAMP_S)
 
 
-def run_up_mm(speed_mm_s: float) -> float:
-    """Return the distance in which such a movement reaches its speed, and stops.
+def run_up_mm(speed_mm_s: float, acceleration_mm_s2: float | None = None) -> float:
+    """Return the distance in which such a movement reaches its speed, and stops at the latest.
 
     With acceleration a and jerk j the speed v takes v/a + a/j, or 2 sqrt(v/j) where a is never
     reached, and half of v times that is the way.
@@ -449,7 +464,9 @@ def run_up_mm(speed_mm_s: float) -> float:
     Raises:
         ConfigError: The speed is not above 0, or not finite.
     """
-    velocity, acceleration, _, jerk = up_to_an_edge(speed_mm_s, unit_um=_UM_PER_MM)
+    velocity, acceleration, _, jerk = up_to_an_edge(
+        speed_mm_s, unit_um=_UM_PER_MM, acceleration_mm_s2=acceleration_mm_s2
+    )
     if velocity < acceleration**2 / jerk:
         took_s = 2 * math.sqrt(velocity / jerk)
     else:
@@ -471,8 +488,10 @@ def shortest_time_s(distance: float, dynamics: Four) -> float:
     return 2 * math.sqrt(distance / acceleration)
 
 
-def dynamics_of(profile: MotionProfile, *, unit_um: float) -> Four:
+def dynamics_of(
+    profile: MotionProfile, *, unit_um: float, acceleration_mm_s2: float | None = None
+) -> Four:
     """Return the numbers of a profile: factors for joint moves, else units per second."""
     if profile.path is Path.JOINT:
         return factors(profile.speed_percent)
-    return straight(profile.speed_mm_s, unit_um=unit_um)
+    return straight(profile.speed_mm_s, unit_um=unit_um, acceleration_mm_s2=acceleration_mm_s2)

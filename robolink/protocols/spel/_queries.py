@@ -30,6 +30,7 @@ _LAST_OUTPUT = 0xFFFF
 exist."""
 
 _LAST_SPEED = 3
+_LAST_ACCELERATION = 6
 _LAST_JOINT = 6
 _LAST_POINT = 999
 
@@ -202,14 +203,18 @@ def print_speed_s(index: int) -> Statement:
     return Statement(f"Print SpeedS({_which(index)})")
 
 
-def print_speeding_up() -> Statement:
-    """Acceleration of straight movements in mm/s^2 (docs/reference/spel.md 7.2)."""
-    return Statement("Print AccelS(1)")
+def print_accel_s(index: int) -> Statement:
+    """How straight movements speed up and brake, in mm/s^2 (docs/reference/spel.md 7.2).
 
+    Args:
+        index: 1 acceleration, 2 deceleration; 3 and 4 the same for Jump3's departure, 5 and 6 for
+            its approach.
 
-def print_braking() -> Statement:
-    """Deceleration of straight movements in mm/s^2 (docs/reference/spel.md 7.2)."""
-    return Statement("Print AccelS(2)")
+    Raises:
+        LocalProtocolError: ``index`` is not 1 to 6.
+    """
+    check_range(tr("An acceleration's number"), index, 1, _LAST_ACCELERATION)
+    return Statement(f"Print AccelS({index})")
 
 
 def print_joint_angle(joint: int) -> Statement:

@@ -31,6 +31,8 @@ _HANDS: Final = {Hand.RIGHT: " /R", Hand.LEFT: " /L"}
 LAST_TOOL: Final = 15
 _MIN_SPEED_MM_S: Final = 0.1
 _MAX_SPEED_MM_S: Final = 2000.0
+_MIN_ACCEL_MM_S2: Final = 0.1
+_ACCELERATIONS: Final = (2, 6)
 
 _Speed = TypeVar("_Speed", int, float)
 
@@ -154,6 +156,31 @@ def speed_s(mm_s: float, depart: float | None = None, approach: float | None = N
                 remedy=tr("Use 0.1 to 2000 mm/s."),
             )
     return Statement(f"SpeedS {written}")
+
+
+def accel_s(*values_mm_s2: float) -> Statement:
+    """``AccelS 150.000, 100.000``: acceleration and deceleration of straight movements.
+
+    The highest value depends on the robot, so it is left to the controller.
+
+    Args:
+        values_mm_s2: Both; or six, with those of Jump3's departure and approach.
+
+    Raises:
+        LocalProtocolError: Another number of them, or one below 0.1 mm/s^2 (docs/reference/spel.md
+            7.2).
+
+    Example:
+        >>> from robolink.protocols.spel import accel_s
+        >>> accel_s(150, 100)
+        'AccelS 150.000, 100.000'
+    """
+    if len(values_mm_s2) not in _ACCELERATIONS or min(values_mm_s2) < _MIN_ACCEL_MM_S2:
+        raise LocalProtocolError(
+            tr("These accelerations cannot be set: {values}.", values=values_mm_s2),
+            remedy=tr("Give two or six values of 0.1 mm/s^2 or more."),
+        )
+    return Statement("AccelS " + ", ".join(map(decimal, values_mm_s2)))
 
 
 def _point(target: Pose, *, six_axes: bool) -> str:

@@ -17,6 +17,7 @@ from robolink.messages import tr
 from robolink.model import ControllerStatus
 from robolink.stopping import find_note
 from robolink.transport import far_end_of
+from robolink_cli.access.cell import acceleration_of
 from robolink_cli.access.record import recording
 from robolink_cli.console.exit_codes import error_body
 from robolink_cli.console.render import note
@@ -258,6 +259,7 @@ class TrialConnections:
             password=self._password,
             timeout_s=self._context.timeout_s,
             remote_timeout_s=self._context.remote_timeout_s,
+            acceleration_mm_s2=acceleration_of(self._context.cell),
             trace=self._trace,
             outcomes=self._record,
         )

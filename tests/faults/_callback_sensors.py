@@ -156,6 +156,40 @@ class BeamCell(CallbackCell):
             points.store(at + 40, Point.at(replace(scan.start, x_mm=2.0 * scan.beam)))
 
 
+_AROUND = """
+Function Around(turn As Double, deeper As Double) As Boolean
+  Around = RobolinkAround(21, {first}, {second}, turn, deeper)
+Fend
+"""
+
+
+class RoundCell(BeamCell):
+    """The same beams, around which the program drives by itself, one line a round."""
+
+    main = main_of(
+        "beams@gate",
+        f"Around(0, {SHAFT_MM})",
+        "Around(-90, 0)",
+        _AROUND.format(first=BEAM_INPUTS[0], second=BEAM_INPUTS[1]),
+    )
+    search_mm = 2.0
+
+    def bring(self):
+        (ax, ay), (bx, by) = (beam.normal for beam in self.station.beams)
+        area = ax * by - ay * bx
+        x, y, z = self.recorded_mm
+        for number, (first, second) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1)), start=21):
+            one, other = first * self.search_mm, second * self.search_mm
+            corner = Pose(
+                x + (one * by - other * ay) / area,
+                y + (other * ax - one * bx) / area,
+                z - BeamsParameters().dip_mm,
+                MEASURED_U,
+                hand=self.simulator.machine.arm.flange().hand,
+            )
+            self.simulator.machine.points.store(number, Point.at(corner))
+
+
 class CameraCell(CallbackCell):
     """An up-looking camera that the controller's own vision system uses."""
 

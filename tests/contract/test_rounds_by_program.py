@@ -1,0 +1,324 @@
+"""A round about the beams is driven by robolink, or by the controller's own program: one verdict.
+
+The same cell with the same seed is measured both ways. What would let a program's round agree and
+be wrong is refused: a round that was not driven in Power Low, in another tool, without its run-up,
+too fast, or broken off; and a line that is lost moves nothing again.
+"""
+
+import math
+import re
+from dataclasses import replace
+
+import pytest
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.testkit.media import served
+from robolink_simulators.testkit.program_calls import CallFault
+
+import robolink
+from robolink.calibration import Beam
+from robolink.errors import CalibrationError, RemoteProtocolError, RobolinkError
+from robolink.methods import BeamsParameters, BeamsSource
+from robolink.model import EntryKind
+from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
+from robolink.serving._beam_round import read_round, require_promised, round_crossings
+from robolink.stations import BeamStation
+from tests.contract._sensor_cell import SensorCell
+from tests.faults._callback_sensors import BEAM_INPUTS, HEADINGS, RoundCell
+
+ONCE = BeamsParameters(repeats=1, test_turn_deg=90.0, crossing_mm_s=8.0, aside_mm=2.1)
+SAME = {"large_drift": "drift"}
+soak = pytest.mark.soak
+
+
+@pytest.fixture
+def cells(tmp_path):
+    """Make cells of one seed, and close them."""
+    made = []
+
+    def make(change=lambda _cell: None, **options):
+        folder = tmp_path / str(len(made))
+        folder.mkdir()
+        cell = RoundCell(folder, in_process=True, **options)
+        made.append(cell)
+        cell.change_needle()
+        change(cell)
+        return cell
+
+    yield make
+    for cell in made:
+        cell.close()
+
+
+def by_program(cell):
+    """Return the code of the program's end, empty if the value was kept."""
+    (printed,) = cell.run()
+    return "" if printed == "kept" else printed
+
+
+def by_driver(cell):
+    """Change the needle by movements of robolink; return code, and the report."""
+    with served(cell.simulator, clock=ManualClock()) as url, robolink.connect(url) as controller:
+        change = SensorCell(cell.simulator, url, ManualClock()).change(
+            BeamsSource(cell.station, ONCE, sigma_mm=0.01), drift_tolerance_mm=0.1
+        )
+        try:
+            return "", change(controller)
+        except RobolinkError as error:
+            code = str(getattr(error, "code", "")) or type(error).__name__
+            return SAME.get(code, code), None
+
+
+def moved(mm):
+    def move(cell):
+        x, y, z = cell.recorded_mm
+        cell.stand_at((x + mm, y, z))
+
+    return move
+
+
+def bent(cell):
+    world = cell.simulator.world
+    world.set_up(replace(world.parameters, lean_deg=6.0))
+
+
+def unplugged(cell):
+    cell.simulator.world.disconnect(4)
+
+
+def always_broken(cell):
+    cell.simulator.world.disconnect(4)
+    cell.simulator.machine.inputs.set(4, on=True)
+
+
+def test_a_round_by_the_program_finds_what_robolink_finds(cells):
+    program, driver = cells(), cells()
+    before = program.tool
+    code, report = by_driver(driver)
+    assert (by_program(program), code) == ("", "")
+    assert program.tool != before
+    assert program.error_mm < 0.01
+    assert math.dist(program.tool.components()[:2], driver.tool.components()[:2]) < 0.01
+    (entry,) = program.entries(EntryKind.CALIBRATION)
+    assert len(entry.details["crossings"]) == 4 + 4
+    assert entry.details["repeatable_to_mm"] == pytest.approx(
+        report.proposal.result.repeatable_to_mm, rel=0.5
+    )
+    assert entry.details["rounds"] == 2 * [
+        {
+            "tool": 1,
+            "motors_on": True,
+            "power_high": False,
+            "speed_mm_s": 8.0,
+            "acceleration_mm_s2": 200.0,
+        }
+    ]
+    assert len(rounds(program)) == 3
+    assert max(map(len, program.calls.questions)) <= 255
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        (moved(0.15), "drift"),
+        pytest.param(bent, "bent_needle", marks=soak),
+        pytest.param(unplugged, "no_edge", marks=soak),
+        pytest.param(always_broken, "edge_passed", marks=soak),
+    ],
+)
+def test_what_robolink_refuses_the_program_is_refused(cells, change, code):
+    program, driver = cells(change), cells(change)
+    old = program.tool
+    assert (by_program(program), by_driver(driver)[0]) == (code, code)
+    assert program.tool.rounded(3) == driver.tool.rounded(3) == old.rounded(3)
+    assert program.open_markers() == []
+
+
+def beams_exchanged(cell):
+    """Number the program's points so that its first side crosses the second beam."""
+    points = cell.simulator.machine.points
+    corners = [points.get(number) for number in range(21, 25)]
+    for number, corner in zip(range(21, 25), (corners[0], *corners[:0:-1]), strict=True):
+        points.store(number, corner)
+
+
+@soak
+def test_beams_that_were_told_the_wrong_way_round_confirm_no_tip(tmp_path):
+    """Taken for the other beam, each pass leads along it: it would say where the square is."""
+    first, second = (f"21, {number}" for number in BEAM_INPUTS)
+    main = RoundCell.main.replace(f"{first}, {BEAM_INPUTS[1]}", f"{second}, {BEAM_INPUTS[0]}")
+    assert main != RoundCell.main
+    cell = RoundCell(tmp_path, in_process=True, main=main)
+    cell.change_needle()
+    beams_exchanged(cell)
+    old = cell.tool
+    assert by_program(cell) == "no_crossing"
+    assert cell.tool.rounded(3) == old.rounded(3)
+    cell.close()
+
+
+def rounds(cell):
+    return [line for line in cell.calls.questions if b",ROUND," in line]
+
+
+def lost(number, fault):
+    """Plan a fault for one of the rounds."""
+
+    def change(cell):
+        seen = []
+
+        def of(_number, line):
+            if b",ROUND," not in line:
+                return None
+            seen.append(line)
+            return fault if len(seen) == number else None
+
+        cell.calls.fault = of
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("number", "fault"),
+    [
+        pytest.param(1, CallFault(drop_answer=True), marks=soak),
+        pytest.param(2, CallFault(cut_before=True), marks=soak),
+        (3, CallFault(drop_answer=True)),
+        pytest.param(3, CallFault(bend_question=True), marks=soak),
+        pytest.param(3, CallFault(cut_after=True), marks=soak),
+    ],
+)
+def test_a_round_whose_line_is_lost_is_not_driven_again(cells, number, fault):
+    cell, driven = cells(lost(number, fault)), []
+    old = cell.tool
+    cell.runner.on_statement = lambda _t, _f, _n, text: driven.append(text)
+    assert by_program(cell) != ""
+    assert sum("SpeedS" in text and text.endswith(" 8") for text in driven) == number
+    assert len(rounds(cell)) == number
+    assert cell.tool.rounded(3) == old.rounded(3)
+    flange = cell.simulator.machine.arm.flange()
+    lift_mm = flange.z_mm + cell.tool.z_mm - cell.recorded_mm[2]
+    assert lift_mm > 10
+
+
+@soak
+@pytest.mark.parametrize("nth", [1, 3, 8, 9, 16, 20])
+def test_power_that_fails_in_a_round_leaves_the_old_tool(cells, nth):
+    """Nothing of the round is driven when the program starts again: only the tool is put back."""
+    cell = cells()
+    old = cell.tool
+    at = [
+        number
+        for number, (_file, _line, text) in enumerate(cell.statements())
+        if "Till Sw(bit)" in text
+    ]
+    again = cells()
+    assert again.run_until(at[nth - 1]) is not None
+    begun = len(rounds(again))
+    again.restore()
+    assert again.tool.rounded(3) == old.rounded(3)
+    assert len(rounds(again)) == begun
+
+
+@soak
+def test_a_servo_that_lags_behind_shifts_no_edge(cells):
+    """A movement that an input has ended does not wait until the arm is at rest."""
+    cell = cells(options=EpsonOptions(servo_lag_ms=10.0))
+    assert by_program(cell) == ""
+    assert cell.error_mm < 0.01
+
+
+@soak
+@pytest.mark.parametrize("nth", [1, 8, 9, 17, 24])
+def test_an_emergency_stop_in_a_round_ends_it_where_the_robot_is(cells, nth):
+    cell, begun = cells(), []
+    old, simulator = cell.tool, cell.simulator
+    cell.runner.on_statement = lambda _t, _f, _n, text: begun.append("Till Sw(bit)" in text)
+    cell.start()
+    while sum(begun) < nth:
+        simulator.advance(simulator.next_change())
+    simulator.panel.press_estop()
+    there, asked = simulator.machine.arm.flange(), len(cell.calls.questions)
+    simulator.advance(simulator.now_ns + 30 * 10**9)
+    assert simulator.machine.arm.flange() == there
+    assert len(cell.calls.questions) == asked
+    cell.lose_power()
+    cell.restore()
+    assert cell.tool.rounded(3) == old.rounded(3)
+
+
+SQUARE = ("0", "1", "1", "0", "8000", "200", "298000", "78000", "-60000", "20000", "0", "0")
+SIDES = (
+    *("032", "0", "1500", "0", "2500", "0", "4000"),
+    *("032", "1500", "4000", "2500", "4000", "4000", "4000"),
+    *("032", "4000", "2500", "4000", "1500", "4000", "0"),
+    *("032", "2500", "0", "1500", "0"),
+)
+STATION = BeamStation(
+    tuple(Beam(300.0, 80.0, heading) for heading in HEADINGS), -60.0, inputs=(3, 4)
+)
+
+
+def told(*, state=SQUARE, sides=SIDES, **changed):
+    state = [changed.get(f"f{number}", field) for number, field in enumerate(state)]
+    driven = read_round([*state, *sides])
+    require_promised(driven)
+    return round_crossings(driven, changed.get("station", STATION))
+
+
+def test_a_round_says_where_each_edge_was():
+    crossings = told()
+    assert [one.beam for one in crossings] == [0, 1, 0, 1]
+    assert (crossings[1].entry.x_mm, crossings[1].exit.y_mm) == (299.5, 82.0)
+    assert crossings[3].exit.tool == 1
+
+
+@pytest.mark.parametrize(
+    ("changed", "code"),
+    [
+        ({"f2": "0"}, "not_low_power"),
+        ({"f3": "1"}, "not_low_power"),
+        ({"f4": "20001"}, "crossing_speed"),
+        ({"f4": "400"}, "crossing_speed"),
+        ({"f5": "0"}, None),
+        ({"f5": "20"}, "run_up_too_short"),
+        ({"station": replace(STATION, off_when_broken=True)}, "edge_passed"),
+        ({"sides": ("100", "0", "0", "0", "0")}, "edge_passed"),
+        ({"sides": ("000", "0", "0", "0", "0")}, "no_edge"),
+        ({"sides": ("020", "0", "0", "0", "0")}, "edge_passed"),
+        ({"sides": (*SIDES[:7], "030", "1500", "4000", "4000", "4000")}, "no_edge"),
+        ({"sides": (*SIDES[:7], "033", "1500", "4000", "4000", "4000")}, "edge_passed"),
+        ({"sides": (*SIDES[:5], "0", "4000", *SIDES[7:14], "032", "4000", "4000", "1", "1")}, None),
+    ],
+)
+def test_a_round_that_shows_nothing_is_refused(changed, code):
+    refused = RemoteProtocolError if code is None else CalibrationError
+    with pytest.raises(refused) as raised:
+        told(**changed)
+    assert code is None or raised.value.code == code
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        SQUARE,
+        (*SQUARE, *SIDES, "0"),
+        (*SQUARE, *SIDES, *SIDES[-7:]),
+        (*SQUARE, *SIDES[:5]),
+        (*SQUARE, "042", *SIDES[1:]),
+        ("2", *SQUARE[1:], *SIDES),
+        (*SQUARE[:5], "-200", *SQUARE[6:], *SIDES),
+    ],
+)
+def test_a_line_that_is_no_round_is_not_understood(fields):
+    with pytest.raises(RemoteProtocolError):
+        read_round(fields)
+
+
+def test_the_longest_round_fits_into_a_text_of_the_controller():
+    """A longer one would end the program with the tip low between the beams."""
+    place = ("-1999999", "-1999999", "-1999999", "-359999", "-179999", "-179999")
+    state = ("1", "15", "1", "0", "8000", "25000", *place)
+    sides = tuple(field if re.fullmatch("0..", field) else "-9899" for field in SIDES)
+    line = encode_line(CallbackLine(99, CallbackWord.ROUND, (*state, *sides)))
+    assert len(line) <= 255 + 2

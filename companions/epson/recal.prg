@@ -51,6 +51,7 @@ Global Integer rl_number
 Global Integer rl_clear
 Global Integer rl_level
 Global Integer rl_proof
+Global Integer rl_go
 Global Integer rl_free1
 Global Integer rl_free2
 Global Integer rl_even
@@ -105,6 +106,7 @@ Function RobolinkBegin(n As Integer, method$ As String) As Boolean
       If rl_word$ = "GO" Then
         rl_tool = n
         rl_robot = Robot
+        rl_go = 1
         RobolinkBegin = True
       EndIf
     EndIf
@@ -148,7 +150,7 @@ Function RobolinkAround(p As Integer, bit1 As Integer, bit2 As Integer, turn As 
   Integer used, mode, i
   Double percent(2), speeds_mm(2)
   RobolinkAround = False
-  If rl_open = 0 Or Robot <> rl_robot Then
+  If rl_open = 0 Or rl_go = 0 Or Robot <> rl_robot Then
     Exit Function
   EndIf
   used = Tool
@@ -303,6 +305,7 @@ Function RlHello(host$ As String, port As Integer) As Boolean
   String op$
   RlHello = False
   rl_number = 0
+  rl_go = 0
   op$ = rl_op$
   If op$ = "" Then
     op$ = "-"
@@ -415,6 +418,7 @@ Function RlAsk(text$ As String) As Boolean
   rl_word$ = part$(2)
   If rl_word$ = "REFUSE" Or rl_word$ = "BACK" Then
     rl_code$ = rl_field$(0)
+    rl_go = 0
   EndIf
   OnErr GoTo 0
   RlAsk = True
@@ -482,7 +486,8 @@ Function RlReady As Boolean
   EndIf
 Fend
 
-' True if four points are there, level and not turned against each other, and near to each other.
+' True if four points are there, level and not turned against each other, near to each other, and of
+' the hand that the arm has.
 Function RlCorners(p As Integer, deeper As Double) As Boolean
   Integer i
   RlCorners = False
@@ -491,6 +496,9 @@ Function RlCorners(p As Integer, deeper As Double) As Boolean
   EndIf
   For i = p To p + 3
     If PDef(P(i)) = False Then
+      Exit Function
+    EndIf
+    If Hand(P(i)) <> Hand(Here) Then
       Exit Function
     EndIf
     If Abs(CX(P(i)) - CX(P(p))) > 9.9 Or Abs(CY(P(i)) - CY(P(p))) > 9.9 Then

@@ -97,11 +97,12 @@ def read_round(fields: Sequence[str]) -> BeamRound:
     # The last side tells no end: it is the first corner, or was not reached.
     count, over = divmod(len(rest) + 2, _SIDE_FIELDS)
     if len(state) != _STATE_FIELDS or over or not 1 <= count <= _SIDES:
-        raise RemoteProtocolError(tr("A round has the wrong number of fields."))
+        raise RemoteProtocolError(tr("No round has {count} fields.", count=len(fields)))
     proof, motors, power = (_yes(field) for field in (state[0], state[2], state[3]))
     (speed_mm_s,) = read_thousandths(state[4:5], 1)
     tool, acceleration = (_count(field) for field in (state[1], state[5]))
-    corner = Pose(*read_components(state[6:]), tool=tool)
+    x, y, z, u, v, w = read_components(state[6:])
+    corner = Pose(x_mm=x, y_mm=y, z_mm=z, u_deg=u, v_deg=v, w_deg=w, tool=tool)
     sides = tuple(_sides([*rest, "0", "0"], corner))
     last = sides[-1]
     if count < _SIDES and last.left and last.exit_on is last.before:

@@ -507,6 +507,11 @@ Function RlCorners(p As Integer, deeper As Double) As Boolean
     If Abs(CZ(P(i)) - CZ(P(p))) > 0.001 Or Abs(CU(P(i)) - CU(P(p))) > 0.001 Then
       Exit Function
     EndIf
+    If RlSixAxes() Then
+      If Abs(CV(P(i)) - CV(P(p))) > 0.001 Or Abs(CW(P(i)) - CW(P(p))) > 0.001 Then
+        Exit Function
+      EndIf
+    EndIf
   Next i
   RlCorners = True
 Fend
@@ -640,11 +645,16 @@ Fend
 ' Gives where the robot is, from the first corner; notes whether it is still level.
 Function RlPlace$ As String
   Long dx, dy
+  Double turned
   dx = Int(CX(RealPos) * 1000 + 0.5)
   dy = Int(CY(RealPos) * 1000 + 0.5)
   dx = dx - rl_x
   dy = dy - rl_y
-  If Abs(CZ(RealPos) - rl_z) > 0.02 Or Abs(CU(RealPos) - rl_u) > 0.01 Then
+  turned = Abs(CU(RealPos) - rl_u)
+  If turned > 180 Then
+    turned = Abs(turned - 360)
+  EndIf
+  If Abs(CZ(RealPos) - rl_z) > 0.02 Or turned > 0.01 Then
     rl_even = 0
   EndIf
   RlPlace$ = "," + Str$(dx) + "," + Str$(dy)

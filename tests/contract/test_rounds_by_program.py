@@ -19,12 +19,12 @@ import robolink
 from robolink.calibration import Beam
 from robolink.errors import CalibrationError, RemoteProtocolError, RobolinkError
 from robolink.methods import BeamsParameters, BeamsSource
-from robolink.model import EntryKind, Hand
+from robolink.model import EntryKind, Hand, ToolOffset
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
 from robolink.serving._beam_round import read_round, require_promised, round_crossings
 from robolink.stations import BeamStation
 from tests.contract._sensor_cell import SensorCell
-from tests.faults._callback_sensors import BEAM_INPUTS, HEADINGS, RoundCell
+from tests.faults._callback_sensors import BEAM_INPUTS, HEADINGS, RoundCell, SixAxisRoundCell
 
 ONCE = BeamsParameters(repeats=1, test_turn_deg=90.0, crossing_mm_s=8.0, aside_mm=2.1)
 SAME = {"large_drift": "drift"}
@@ -134,6 +134,17 @@ def test_what_robolink_refuses_the_program_is_refused(cells, change, code):
     assert program.open_markers() == []
 
 
+@soak
+def test_six_axes_drive_a_round_too(tmp_path):
+    cell = SixAxisRoundCell(tmp_path, in_process=True)
+    cell.change_needle()
+    assert cell.error_mm > 0.2
+    assert by_program(cell) == ""
+    assert cell.error_mm < 0.01
+    assert max(map(len, cell.calls.questions)) <= 255
+    cell.close()
+
+
 def beams_exchanged(cell):
     """Number the program's points so that its first side crosses the second beam."""
     points = cell.simulator.machine.points
@@ -172,6 +183,25 @@ def corner(number, axis, value):
         )
 
     return change
+
+
+def test_a_round_is_driven_in_low_power_and_leaves_production_as_it_was(tmp_path):
+    fast = "  Tool 2\n  Power High\n  Speed 50, 40, 30\n  SpeedS 200, 150, 100\n"
+    shown = "  Print Power, Speed(1), Speed(3), SpeedS(1), SpeedS(3), Tool\n"
+    main = RoundCell.main.replace("  Tool 1\n", fast)
+    main = main.replace("  RobolinkClose\n", f"  RobolinkClose\n{shown}")
+    cell = RoundCell(tmp_path, in_process=True, main=main)
+    cell.simulator.machine.tools.set(2, ToolOffset(1.0, 2.0, -3.0))
+    cell.change_needle()
+    moved, machine = [], cell.simulator.machine
+    cell.runner.on_statement = lambda _t, file, _n, text: moved.append(
+        (machine.robot.power_high, machine.tools.selected)
+        if file == "recal.prg" and text.startswith(("Go ", "Move "))
+        else None
+    )
+    assert cell.run() == ["kept", "1", "50", "30", "200", "100", "2"]
+    assert set(moved) == {None, (False, 1)}
+    cell.close()
 
 
 def in_a_local(cell):

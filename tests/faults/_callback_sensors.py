@@ -4,10 +4,12 @@ import math
 from dataclasses import replace
 
 from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.epson.camera_calibrations import VisionCalibration
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.vision_project import VisionObject, VisionProject, VisionSequence
 from robolink_simulators.epson.vision_system import VisionSystem
+from robolink_simulators.epson.world import STORED_ON_SIX_AXES
 
 from robolink.calibration import Beam
 from robolink.methods.beams import BeamsParameters
@@ -188,6 +190,23 @@ class RoundCell(BeamCell):
                 hand=self.simulator.machine.arm.flange().hand,
             )
             self.simulator.machine.points.store(number, Point.at(corner))
+
+
+class SixAxisRoundCell(RoundCell):
+    """The same on six axes, whose points have V, W and a posture."""
+
+    robot = "C8-C901SR"
+
+    def change_needle(self):
+        self.simulator.world.tips[1] = exchanged(STORED_ON_SIX_AXES, self.rng)
+        self.bring()
+
+    def bring(self):
+        super().bring()
+        points, flange = self.simulator.machine.points, self.simulator.machine.arm.flange()
+        for number in range(21, 25):
+            x, y, z, *_ = points.get(number).coordinates
+            points.store(number, Point.at(replace(flange, x_mm=x, y_mm=y, z_mm=z)))
 
 
 class CameraCell(CallbackCell):

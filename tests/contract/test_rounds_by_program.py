@@ -13,18 +13,24 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.testkit.media import served
-from robolink_simulators.testkit.program_calls import CallFault
+from robolink_simulators.testkit.program_calls import AnsweredHere, CallFault
 
 import robolink
 from robolink.calibration import Beam
 from robolink.errors import CalibrationError, RemoteProtocolError, RobolinkError
 from robolink.methods import BeamsParameters, BeamsSource
 from robolink.model import EntryKind, Hand, ToolOffset
-from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
+from robolink.protocols.spel_callback import CallbackLine, CallbackWord, decode_line, encode_line
 from robolink.serving._beam_round import read_round, require_promised, round_crossings
 from robolink.stations import BeamStation
 from tests.contract._sensor_cell import SensorCell
-from tests.faults._callback_sensors import BEAM_INPUTS, HEADINGS, RoundCell, SixAxisRoundCell
+from tests.faults._callback_sensors import (
+    BEAM_INPUTS,
+    HEADINGS,
+    MEASURED_U,
+    RoundCell,
+    SixAxisRoundCell,
+)
 
 ONCE = BeamsParameters(repeats=1, test_turn_deg=90.0, crossing_mm_s=8.0, aside_mm=2.1)
 SAME = {"large_drift": "drift"}
@@ -172,6 +178,15 @@ def rounds(cell):
     return [line for line in cell.calls.questions if b",ROUND," in line]
 
 
+def far_beside(cell):
+    """Mount a needle that stands in the first beam where the first side begins."""
+    normal, turn = cell.station.beams[0].normal, math.radians(-MEASURED_U)
+    x, y = (cell.search_mm * way for way in normal)
+    c, s = math.cos(turn), math.sin(turn)
+    tips, stored = cell.simulator.world.tips, cell.tool
+    tips[1] = replace(stored, x_mm=stored.x_mm + c * x - s * y, y_mm=stored.y_mm + s * x + c * y)
+
+
 def corner(number, axis, value):
     """Change one of the program's points."""
 
@@ -244,8 +259,61 @@ def test_points_in_a_local_are_found_out_above_the_beams(cells):
 
 
 @soak
+@pytest.mark.parametrize(
+    ("change", "searches"),
+    [pytest.param(unplugged, 3, id="dark"), pytest.param(far_beside, 0, id="broken")],
+)
+def test_nothing_is_searched_where_an_edge_is_missing(cells, change, searches):
+    """What a condition does that holds from the start is not documented."""
+    cell, driven = cells(change), []
+    cell.runner.on_statement = lambda _t, _f, _n, text: driven.append("Till Sw(bit)" in text)
+    assert by_program(cell) in {"no_edge", "edge_passed"}
+    assert sum(driven) == searches
+
+
+@soak
+def test_a_robot_that_does_not_stay_level_tells_no_round(cells):
+    cell = cells(options=EpsonOptions(real_pos_noise_mm=0.015))
+    assert by_program(cell) == "not_ready"
+    assert rounds(cell) == []
+
+
+class Altered(AnsweredHere):
+    """Answers rounds of which one field is another."""
+
+    def __init__(self, answers, number, field):
+        super().__init__(answers)
+        self._number, self._field = number, field
+
+    def ask(self, question):
+        line = decode_line(question)
+        if line.word is CallbackWord.ROUND:
+            fields = [*line.fields]
+            fields[self._number] = self._field
+            question = encode_line(replace(line, fields=tuple(fields))).removesuffix(b"\r\n")
+        return super().ask(question)
+
+
+@pytest.mark.parametrize(
+    ("number", "field", "code"),
+    [
+        pytest.param(3, "1", "not_low_power", id="power", marks=soak),
+        pytest.param(1, "2", "tool_pose", id="tool", marks=soak),
+    ],
+)
+def test_a_round_that_was_driven_otherwise_is_refused(cells, number, field, code):
+    cell = cells()
+    cell.calls.far = lambda: Altered(cell.conversation("the program"), number, field)
+    assert by_program(cell) == code
+    assert len(rounds(cell)) == 1
+
+
+@soak
 def test_nothing_is_driven_that_was_not_begun(tmp_path):
-    main = RoundCell.main.replace('RobolinkBegin(1, "beams@gate")', "rl_open = 1")
+    main = RoundCell.main.replace('RobolinkBegin(1, "beams@gate")', "rl_robot = 1")
+    main = main.replace(
+        "  RobolinkRestore\n", "  RobolinkRestore\n  rl_robot = 1\n  rl_tool = 1\n", 1
+    )
     cell = RoundCell(tmp_path, in_process=True, main=main)
     cell.change_needle()
     there = cell.simulator.machine.arm.flange()

@@ -14,17 +14,26 @@
 ' In place of touches, with RobolinkBegin(1, "beams@NAME") or RobolinkBegin(1, "camera"):
 '
 '     RobolinkApproach(8), then twice RobolinkEdge(1, 8)   beam 1 on input 8: broken, free again
+'     RobolinkAround(21, 8, 9, 0, 3)       or all of it: around both beams by P21 to P24, at U and
+'                                          height of these points, then 3 mm deeper
 '     RobolinkSeen(n, x, y)                robot at rest: n candidates, and where the one is, RobotXYU;
 '                                          beside each place first, then at it
 '     RobolinkFinish                       keeps the new value, or puts the old one back
 '     RobolinkClose                        in any case
 '
-' Each but the first and last gives False when it came to nothing. It moves nothing. Call it from
-' one normal task only. Port 201 and timer 60 are its own.
+' Each but the first and last gives False when it came to nothing. Only RobolinkAround moves the
+' robot. Call it from one normal task only. Port 201 and timer 60 are its own.
 
 #define RL_PORT 201
 #define RL_TIMER 60
 #define RL_WAIT_S 10
+
+' How RobolinkAround drives, always in Power Low.
+#define RL_CROSSING_MM_S 8         ' through a beam
+#define RL_TRAVEL_MM_S 60          ' up and down
+#define RL_PERCENT 10              ' above the beams
+#define RL_LIFT_MM 12              ' so far above the points it comes, turns and leaves
+#define RL_TURN_DEG 15             ' it turns in steps of this, so that the tip stays above its place
 
 Global Preserve Integer rl_flag    ' 0 none, 1 old value must come back, 2 kept, 3 put back
 Global Preserve Integer rl_robot   ' the robot of the last change
@@ -42,6 +51,14 @@ Global Integer rl_number
 Global Integer rl_clear
 Global Integer rl_level
 Global Integer rl_proof
+Global Integer rl_go
+Global Integer rl_free1
+Global Integer rl_free2
+Global Integer rl_even
+Global Long rl_x
+Global Long rl_y
+Global Double rl_z
+Global Double rl_u
 Global String rl_word$
 Global String rl_field$(15)
 
@@ -89,6 +106,7 @@ Function RobolinkBegin(n As Integer, method$ As String) As Boolean
       If rl_word$ = "GO" Then
         rl_tool = n
         rl_robot = Robot
+        rl_go = 1
         RobolinkBegin = True
       EndIf
     EndIf
@@ -122,6 +140,40 @@ Function RobolinkEdge(beam As Integer, bit As Integer) As Boolean
   before = rl_level
   rl_level = Sw(bit)
   RobolinkEdge = RlSend(Str$(beam) + "," + Str$(before) + "," + Str$(rl_level))
+Fend
+
+' Drives the tip around two beams and sends each round as one line. P(p) to P(p + 3) are the corners,
+' local 0, as the tool in question reaches them: the first side crosses the beam of bit1, the second
+' that of bit2, the others lead back. Turned by turn about the tip; then deeper, 0 for not at all.
+' It ends lifted, with tool, power and speeds as before.
+Function RobolinkAround(p As Integer, bit1 As Integer, bit2 As Integer, turn As Double, deeper As Double) As Boolean
+  Integer used, mode, i
+  Double percent(2), speeds_mm(2)
+  RobolinkAround = False
+  If rl_open = 0 Or rl_go = 0 Or Robot <> rl_robot Then
+    Exit Function
+  EndIf
+  used = Tool
+  mode = Power
+  For i = 0 To 2
+    percent(i) = Speed(i + 1)
+    speeds_mm(i) = SpeedS(i + 1)
+  Next i
+  Power Low
+  Tool rl_tool
+  Speed RL_PERCENT
+  SpeedS RL_TRAVEL_MM_S
+  If RlReady() And RlCorners(p, deeper) Then
+    RobolinkAround = RlAround(p, bit1, bit2, turn, deeper)
+  Else
+    rl_code$ = "not_ready"
+  EndIf
+  Tool used
+  Speed percent(0), percent(1), percent(2)
+  SpeedS speeds_mm(0), speeds_mm(1), speeds_mm(2)
+  If mode = 1 Then
+    Power High
+  EndIf
 Fend
 
 ' Sends where the robot stands, how many candidates its camera saw, and where the one is.
@@ -253,6 +305,7 @@ Function RlHello(host$ As String, port As Integer) As Boolean
   String op$
   RlHello = False
   rl_number = 0
+  rl_go = 0
   op$ = rl_op$
   If op$ = "" Then
     op$ = "-"
@@ -365,6 +418,7 @@ Function RlAsk(text$ As String) As Boolean
   rl_word$ = part$(2)
   If rl_word$ = "REFUSE" Or rl_word$ = "BACK" Then
     rl_code$ = rl_field$(0)
+    rl_go = 0
   EndIf
   OnErr GoTo 0
   RlAsk = True
@@ -420,4 +474,198 @@ Function RlSetTool(n As Integer, x As Double, y As Double, z As Double, u As Dou
   Else
     TLSet n, XY(x, y, z, u)
   EndIf
+Fend
+
+' True with motors on, in Power Low, with the tool and the speeds that were set.
+Function RlReady As Boolean
+  RlReady = False
+  If Motor = 1 And Power = 0 And Tool = rl_tool And Speed(1) = RL_PERCENT Then
+    If Abs(SpeedS(1) - RL_TRAVEL_MM_S) < 0.001 Then
+      RlReady = True
+    EndIf
+  EndIf
+Fend
+
+' True if four points are there, level and not turned against each other, near to each other, and of
+' the hand that the arm has.
+Function RlCorners(p As Integer, deeper As Double) As Boolean
+  Integer i
+  RlCorners = False
+  If deeper < 0 Or deeper > 20 Then
+    Exit Function
+  EndIf
+  For i = p To p + 3
+    If PDef(P(i)) = False Then
+      Exit Function
+    EndIf
+    If Hand(P(i)) <> Hand(Here) Then
+      Exit Function
+    EndIf
+    If Abs(CX(P(i)) - CX(P(p))) > 9.9 Or Abs(CY(P(i)) - CY(P(p))) > 9.9 Then
+      Exit Function
+    EndIf
+    If Abs(CZ(P(i)) - CZ(P(p))) > 0.001 Or Abs(CU(P(i)) - CU(P(p))) > 0.001 Then
+      Exit Function
+    EndIf
+    If RlSixAxes() Then
+      If Abs(CV(P(i)) - CV(P(p))) > 0.001 Or Abs(CW(P(i)) - CW(P(p))) > 0.001 Then
+        Exit Function
+      EndIf
+    EndIf
+  Next i
+  RlCorners = True
+Fend
+
+' Comes from above, drives the rounds and leaves upward. Straight up first, then over, then down; what
+' turns does so above the beams, in short steps, so that the tip stays above its place.
+Function RlAround(p As Integer, bit1 As Integer, bit2 As Integer, turn As Double, deeper As Double) As Boolean
+  Integer k, steps
+  Double up, top
+  RlAround = False
+  up = CZ(P(p)) + RL_LIFT_MM
+  top = CZ(Here)
+  If top < up - 0.01 Then
+    Move Here :Z(up)
+  EndIf
+  If top < up Then
+    top = up
+  EndIf
+  Go P(p) :Z(top)
+  If top > up + 0.01 Then
+    Move P(p) :Z(up)
+  EndIf
+  If Abs(CX(RealPos) - CX(P(p))) > 0.05 Or Abs(CY(RealPos) - CY(P(p))) > 0.05 Or Abs(CZ(RealPos) - up) > 0.05 Then
+    ' The point is in a local: it is not where its numbers say.
+    rl_code$ = "not_ready"
+    Exit Function
+  EndIf
+  steps = Int(Abs(turn) / RL_TURN_DEG + 0.999)
+  k = 1
+  Do While k <= steps
+    Go P(p) :Z(up) +U(turn * k / steps)
+    k = k + 1
+  Loop
+  rl_free1 = Sw(bit1)
+  rl_free2 = Sw(bit2)
+  Move P(p) +U(turn)
+  RlAround = RlRound(p, bit1, bit2, turn, 0)
+  If RlAround And deeper > 0 Then
+    SpeedS RL_TRAVEL_MM_S
+    Move P(p) -Z(deeper) +U(turn)
+    RlAround = RlRound(p, bit1, bit2, turn, deeper)
+  EndIf
+  SpeedS RL_TRAVEL_MM_S
+  Move Here :Z(up)
+Fend
+
+' Drives the four sides of one round and sends it. Where an edge does not come it sends what came.
+Function RlRound(p As Integer, bit1 As Integer, bit2 As Integer, turn As Double, deeper As Double) As Boolean
+  Integer side, k, bit, free, before, entry, leaving
+  Boolean good
+  String text$, place1$, place2$, place3$
+  RlRound = False
+  SpeedS RL_CROSSING_MM_S
+  rl_even = 1
+  rl_z = CZ(RealPos)
+  rl_u = CU(RealPos)
+  rl_x = Int(CX(RealPos) * 1000 + 0.5)
+  rl_y = Int(CY(RealPos) * 1000 + 0.5)
+  text$ = "ROUND," + Str$(rl_proof) + "," + Str$(Tool) + "," + Str$(Motor) + "," + Str$(Power)
+  text$ = text$ + "," + RlNumber$(SpeedS(1)) + "," + Str$(RlBraking()) + "," + Str$(rl_x) + "," + Str$(rl_y)
+  text$ = text$ + "," + RlNumber$(rl_z) + "," + RlNumber$(rl_u)
+  If RlSixAxes() Then
+    text$ = text$ + "," + RlNumber$(CV(RealPos)) + "," + RlNumber$(CW(RealPos))
+  Else
+    text$ = text$ + ",0,0"
+  EndIf
+  good = True
+  side = 0
+  Do While good And side < 4
+    bit = bit1
+    free = rl_free1
+    If side = 1 Or side = 3 Then
+      bit = bit2
+      free = rl_free2
+    EndIf
+    k = p + ((side + 1) Mod 4)
+    good = False
+    entry = 0
+    leaving = 0
+    place1$ = ",0,0"
+    place2$ = ",0,0"
+    place3$ = ""
+    before = Sw(bit)
+    If before = free Then
+      entry = RlEdge(k, turn, deeper, bit, 1 - free)
+      place1$ = RlPlace$()
+      If entry = 3 - free Then
+        leaving = RlEdge(k, turn, deeper, bit, free)
+        place2$ = RlPlace$()
+        If leaving = 2 + free Then
+          good = True
+          Move P(k) -Z(deeper) +U(turn)
+          If side < 3 Then
+            place3$ = RlPlace$()
+          EndIf
+        EndIf
+      EndIf
+    EndIf
+    text$ = text$ + "," + Str$(before) + Str$(entry) + Str$(leaving) + place1$ + place2$ + place3$
+    side = side + 1
+  Loop
+  If rl_even = 0 Then
+    rl_code$ = "not_ready"
+    Exit Function
+  EndIf
+  If RlAsk(text$) Then
+    If rl_word$ = "OK" And good Then
+      RlRound = True
+    EndIf
+  EndIf
+Fend
+
+' Drives towards a corner until an input shows a level; gives what it shows at rest, and 2 more if
+' that is what ended the way.
+Function RlEdge(k As Integer, turn As Double, deeper As Double, bit As Integer, level As Integer) As Integer
+  Integer shown
+  If level = 1 Then
+    Move P(k) -Z(deeper) +U(turn) Till Sw(bit) = On
+  Else
+    Move P(k) -Z(deeper) +U(turn) Till Sw(bit) = Off
+  EndIf
+  ' Such a movement ends before the arm is quite at rest.
+  Wait 0.02
+  shown = 0
+  If TillOn Then
+    shown = 2
+  EndIf
+  RlEdge = shown + Sw(bit)
+Fend
+
+' Gives where the robot is, from the first corner; notes whether it is still level.
+Function RlPlace$ As String
+  Long dx, dy
+  Double turned
+  dx = Int(CX(RealPos) * 1000 + 0.5)
+  dy = Int(CY(RealPos) * 1000 + 0.5)
+  dx = dx - rl_x
+  dy = dy - rl_y
+  turned = Abs(CU(RealPos) - rl_u)
+  If turned > 180 Then
+    turned = Abs(turned - 360)
+  EndIf
+  If Abs(CZ(RealPos) - rl_z) > 0.02 Or turned > 0.01 Then
+    rl_even = 0
+  EndIf
+  RlPlace$ = "," + Str$(dx) + "," + Str$(dy)
+Fend
+
+' Gives the lesser of acceleration and deceleration of straight movements, whole mm/s2.
+Function RlBraking As Long
+  Double least
+  least = AccelS(1)
+  If AccelS(2) < least Then
+    least = AccelS(2)
+  EndIf
+  RlBraking = Int(least)
 Fend

@@ -36,6 +36,7 @@ __all__ = [
     "offset_fields",
     "read_components",
     "read_place",
+    "read_thousandths",
     "read_tool",
     "same_thousandths",
     "tool_fields",
@@ -66,7 +67,7 @@ def read_components(fields: Sequence[str]) -> tuple[float, ...]:
     Raises:
         RemoteProtocolError: They are none.
     """
-    return _read(fields, COMPONENTS)
+    return read_thousandths(fields, COMPONENTS)
 
 
 def read_place(fields: Sequence[str]) -> tuple[float, ...]:
@@ -75,10 +76,15 @@ def read_place(fields: Sequence[str]) -> tuple[float, ...]:
     Raises:
         RemoteProtocolError: They are none.
     """
-    return _read(fields, 2)
+    return read_thousandths(fields, 2)
 
 
-def _read(fields: Sequence[str], count: int) -> tuple[float, ...]:
+def read_thousandths(fields: Sequence[str], count: int) -> tuple[float, ...]:
+    """Return so many lengths, angles or speeds, in mm, degrees or mm/s.
+
+    Raises:
+        RemoteProtocolError: They are none, or not so many.
+    """
     if len(fields) != count or not all(map(_WHOLE.fullmatch, fields)):
         raise RemoteProtocolError(
             tr(
@@ -136,6 +142,7 @@ class CallbackWord(StrEnum):
     HELLO = "HELLO"
     BEGIN = "BEGIN"
     POSE = "POSE"
+    ROUND = "ROUND"
     SOLVE = "SOLVE"
     WROTE = "WROTE"
     PROOF = "PROOF"

@@ -1,12 +1,13 @@
 """Two crossed light beams through which a program moved its tip, edge by edge."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from robolink.errors import CalibrationError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
+from robolink.serving._beam_round import BeamRound, require_promised, round_crossings
 from robolink.serving._callback_limits import CallbackLimits, require_poses_sent, require_room
 
 if TYPE_CHECKING:
@@ -15,12 +16,12 @@ if TYPE_CHECKING:
     from robolink.stations import BeamStation
 
 
-LEAST_CROSSINGS: Final = 8
-"""Smallest number of crossings: each beam in both directions, twice; once would leave no residual
-that could contradict the result."""
-
 LEAST_OF_A_ROUND: Final = 4
-"""Number of crossings in one round: each beam in both directions."""
+"""Number of crossings in one round: each beam in both directions. One round is enough, because the
+shaft is crossed too and shares its lags: two residuals could contradict the result."""
+
+_STEP_MM: Final = 0.001
+"""How finely a line tells where an edge was, in mm."""
 
 LEAST_TURN_DEG: Final = 60.0
 """Smallest turn, degrees: from 60 degrees on, a turn test shows beams that were moved by e as a
@@ -79,6 +80,7 @@ class ProgramCrossings:
     ) -> None:
         self._station, self._limits, self._max_lean_deg = station, limits, max_lean_deg
         self._measured, self._proving = _Travels(), _Travels()
+        self._rounds: list[BeamRound] = []
 
     def add(self, flange: Pose, seen: Sequence[str], *, proof: bool) -> int:
         """Add an edge; see ``ProgramMeasure``.
@@ -93,8 +95,29 @@ class ProgramCrossings:
         if before == now:
             raise CalibrationError("no_edge", tr("Input of beam {beam} did not switch.", beam=beam))
         broken = (now == "1") is not self._station.off_when_broken
-        travels = self._proving if proof else self._measured
-        return travels.edge(int(beam) - 1, flange, broken=broken)
+        return self._travels(proof=proof).edge(int(beam) - 1, flange, broken=broken)
+
+    def add_round(self, driven: BeamRound, flange_of: Callable[[Pose], Pose]) -> int:
+        """Add a round that the program drove by itself; return how many crossings there are now.
+
+        Args:
+            driven: What it reports.
+            flange_of: Returns the flange's pose for one in the tool of the round.
+
+        Raises:
+            CalibrationError: Those of :func:`~robolink.serving._beam_round.require_promised` and
+                :func:`~robolink.serving._beam_round.round_crossings`; ``too_many_poses``.
+        """
+        require_promised(driven)
+        travels, count = self._travels(proof=driven.proof), 0
+        self._rounds.append(driven)
+        for one in round_crossings(driven, self._station):
+            travels.edge(one.beam, flange_of(one.entry), broken=True)
+            count = travels.edge(one.beam, flange_of(one.exit), broken=False)
+        return count
+
+    def _travels(self, *, proof: bool) -> _Travels:
+        return self._proving if proof else self._measured
 
     def solve(self, stored: ToolOffset) -> "CalibrationResult":
         """Return the offset; see ``ProgramMeasure``.
@@ -110,9 +133,9 @@ class ProgramCrossings:
         from robolink.calibration import MIN_ROTATION_DEG, angle_spread_deg
         from robolink.methods.beams.crossings import require_straight
 
-        self._measured.require(LEAST_CROSSINGS)
+        self._measured.require(LEAST_OF_A_ROUND)
         crossings, shaft = _by_depth(self._measured.crossings)
-        require_poses_sent(len(crossings), LEAST_CROSSINGS)
+        require_poses_sent(len(crossings), LEAST_OF_A_ROUND)
         solver = self._solver(crossings[0].entry, stored)
         deeper_mm = _deeper_mm(crossings, shaft)
         spread_deg = angle_spread_deg([_heading_deg(one.entry) for one in crossings])
@@ -169,7 +192,8 @@ class ProgramCrossings:
             "crossings": [
                 {"beam": one.beam + 1, "entry": _plain(one.entry), "exit": _plain(one.exit)}
                 for one in self._measured.crossings
-            ]
+            ],
+            "rounds": [one.on_record() for one in self._rounds],
         }
 
     def _solver(self, frame: Pose, expected: ToolOffset) -> "CrossingSolver":
@@ -179,7 +203,9 @@ class ProgramCrossings:
         station = self._station
         tip_z_mm = frame.z_mm + FlangePlane.of(frame).rise_mm(expected)
         dip_mm = station.z_mm - tip_z_mm
-        return CrossingSolver(station.beams, frame, dip_mm, expected, self._limits.sigma_mm)
+        return CrossingSolver(
+            station.beams, frame, dip_mm, expected, self._limits.sigma_mm, _STEP_MM
+        )
 
 
 def _deeper_mm(crossings: "Sequence[Crossing]", shaft: "Sequence[Crossing]") -> float:

@@ -147,6 +147,7 @@ class CallbackConversation:
             CallbackWord.BEGIN: self._begin,
             CallbackWord.POSE: self._pose,
             CallbackWord.PROOF: self._pose_of_proof,
+            CallbackWord.ROUND: self._round,
             CallbackWord.SOLVE: self._solve,
             CallbackWord.WROTE: self._wrote,
             CallbackWord.JUDGE: self._judge,
@@ -264,16 +265,45 @@ class CallbackConversation:
     # What the program measured.
 
     def _pose(self, fields: Sequence[str]) -> Answer:
-        run = self._require_run()
-        if run.change is not None:
-            raise RemoteProtocolError(tr("The touches of the measurement were over."))
-        return self._add(run, fields, {run.tool: run.before}, proof=False)
+        run, stored = self._measuring(proof=False)
+        return self._add(run, fields, {run.tool: stored}, proof=False)
 
     def _pose_of_proof(self, fields: Sequence[str]) -> Answer:
+        run, written = self._measuring(proof=True)
+        return self._add(run, fields, {run.tool: written}, proof=True)
+
+    def _measuring(self, *, proof: bool) -> tuple[_Run, ToolOffset]:
+        """Return what is measured, and the value of its tool at this moment.
+
+        Raises:
+            RemoteProtocolError: Nothing is measured now, or nothing tested.
+        """
         run = self._require_run()
+        if not proof:
+            if run.change is not None:
+                raise RemoteProtocolError(tr("The touches of the measurement were over."))
+            return run, run.before
         if not run.written or run.change is None or run.change.requested is None:
             raise RemoteProtocolError(tr("Nothing was written that could be proved."))
-        return self._add(run, fields, {run.tool: run.change.requested}, proof=True)
+        return run, run.change.requested
+
+    def _round(self, fields: Sequence[str]) -> Answer:
+        from robolink.calibration import flange_poses
+        from robolink.serving._beam_measure import ProgramCrossings
+        from robolink.serving._beam_round import read_round
+
+        driven = read_round(fields)
+        run, value = self._measuring(proof=driven.proof)
+        if not isinstance(run.measure, ProgramCrossings):
+            raise RemoteProtocolError(tr("Only beams are driven around."))
+        if driven.tool != run.tool:
+            raise _other_tool(driven.tool)
+
+        def flange_of(pose: Pose) -> Pose:
+            (flange,) = flange_poses([pose], tools={run.tool: value})
+            return flange
+
+        return CallbackWord.OK, (str(run.measure.add_round(driven, flange_of)),)
 
     def _add(
         self, run: _Run, fields: Sequence[str], known: dict[int, ToolOffset], *, proof: bool
@@ -285,9 +315,7 @@ class CallbackConversation:
             raise RemoteProtocolError(tr("A pose has the wrong number of fields."))
         taken_in, (x, y, z, u, v, w) = _number(pose_fields[0]), read_components(pose_fields[1:])
         if taken_in and taken_in not in known:
-            raise CalibrationError(
-                "tool_pose", tr("A pose was taken in tool {tool}.", tool=taken_in)
-            )
+            raise _other_tool(taken_in)
         pose = Pose(x_mm=x, y_mm=y, z_mm=z, u_deg=u, v_deg=v, w_deg=w, tool=taken_in)
         (flange,) = flange_poses([pose], tools=known)
         return CallbackWord.OK, (str(run.measure.add(flange, seen, proof=proof)),)
@@ -417,6 +445,10 @@ def _number(field_text: str) -> int:
     if not (field_text.isascii() and field_text.isdecimal() and len(field_text) <= 5):
         raise RemoteProtocolError(tr("{field!r} is not a number.", field=field_text))
     return int(field_text)
+
+
+def _other_tool(tool: int) -> CalibrationError:
+    return CalibrationError("tool_pose", tr("A pose was taken in tool {tool}.", tool=tool))
 
 
 def _senseless(line: CallbackLine) -> RemoteProtocolError:

@@ -102,6 +102,7 @@ class CallbackCell:
         main: The program; that of the class by default.
         controllers: Recorded names given to the server.
         in_process: Whether a server without a thread answers.
+        options: The controller's habits.
     """
 
     main = MAIN
@@ -117,6 +118,7 @@ class CallbackCell:
         main="",
         controllers=(),
         in_process=False,
+        options=None,
     ):
         self.controllers = controllers
         self.rng = random.Random(f"callback {seed}")
@@ -126,7 +128,9 @@ class CallbackCell:
         self.address = None if self.server is None else self.server.address
         self.calls = ProgramCalls(self._far_end)
         world = WorldParameters(contact_input=CONTACT)
-        self.simulator = EpsonSimulator(self.robot, serial=SERIAL, seed=seed, world=world)
+        self.simulator = EpsonSimulator(
+            self.robot, serial=SERIAL, seed=seed, world=world, options=options
+        )
         path = Path(folder) / "main.prg"
         path.write_text(main or self.main, encoding="ascii")
         self.runner = self.simulator.load([COMPANION, path])

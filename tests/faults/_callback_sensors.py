@@ -4,10 +4,12 @@ import math
 from dataclasses import replace
 
 from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.epson.camera_calibrations import VisionCalibration
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.vision_project import VisionObject, VisionProject, VisionSequence
 from robolink_simulators.epson.vision_system import VisionSystem
+from robolink_simulators.epson.world import STORED_ON_SIX_AXES
 
 from robolink.calibration import Beam
 from robolink.methods.beams import BeamsParameters
@@ -154,6 +156,57 @@ class BeamCell(CallbackCell):
             points.store(at, Point.at(scan.start))
             points.store(at + 1, Point.at(scan.end))
             points.store(at + 40, Point.at(replace(scan.start, x_mm=2.0 * scan.beam)))
+
+
+_AROUND = """
+Function Around(turn As Double, deeper As Double) As Boolean
+  Around = RobolinkAround(21, {first}, {second}, turn, deeper)
+Fend
+"""
+
+
+class RoundCell(BeamCell):
+    """The same beams, around which the program drives by itself, one line a round."""
+
+    main = main_of(
+        "beams@gate",
+        f"Around(0, {SHAFT_MM})",
+        "Around(-90, 0)",
+        _AROUND.format(first=BEAM_INPUTS[0], second=BEAM_INPUTS[1]),
+    )
+    search_mm = 2.0
+
+    def bring(self):
+        (ax, ay), (bx, by) = (beam.normal for beam in self.station.beams)
+        area = ax * by - ay * bx
+        x, y, z = self.recorded_mm
+        for number, (first, second) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1)), start=21):
+            one, other = first * self.search_mm, second * self.search_mm
+            corner = Pose(
+                x + (one * by - other * ay) / area,
+                y + (other * ax - one * bx) / area,
+                z - BeamsParameters().dip_mm,
+                MEASURED_U,
+                hand=self.simulator.machine.arm.flange().hand,
+            )
+            self.simulator.machine.points.store(number, Point.at(corner))
+
+
+class SixAxisRoundCell(RoundCell):
+    """The same on six axes, whose points have V, W and a posture."""
+
+    robot = "C8-C901SR"
+
+    def change_needle(self):
+        self.simulator.world.tips[1] = exchanged(STORED_ON_SIX_AXES, self.rng)
+        self.bring()
+
+    def bring(self):
+        super().bring()
+        points, flange = self.simulator.machine.points, self.simulator.machine.arm.flange()
+        for number in range(21, 25):
+            x, y, z, *_ = points.get(number).coordinates
+            points.store(number, Point.at(replace(flange, x_mm=x, y_mm=y, z_mm=z)))
 
 
 class CameraCell(CallbackCell):

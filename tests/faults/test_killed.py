@@ -24,7 +24,7 @@ from tests.faults import _killed_looks as looks
 from tests.faults import _killed_orders as orders
 from tests.faults import _killed_restores as restores
 from tests.faults._callback_cell import CallbackCell
-from tests.faults._callback_sensors import BeamCell, CameraCell
+from tests.faults._callback_sensors import BeamCell, CameraCell, RoundCell
 from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
 from tests.faults._change_process import NEW, OLD, CommitStep
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
@@ -215,6 +215,7 @@ def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):
     [
         pytest.param(CallbackCell, id="pin"),
         pytest.param(BeamCell, id="beams", marks=SOAK),
+        pytest.param(RoundCell, id="round", marks=SOAK),
         pytest.param(CameraCell, id="camera", marks=SOAK),
     ],
 )

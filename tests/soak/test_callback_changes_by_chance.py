@@ -12,11 +12,11 @@ from robolink_simulators.testkit.program_calls import CallFault
 
 from robolink.model import EntryKind
 from tests.faults._callback_cell import MEASURED, PROVED, CallbackCell
-from tests.faults._callback_sensors import BEAM_INPUTS, BeamCell, CameraCell
+from tests.faults._callback_sensors import BEAM_INPUTS, BeamCell, CameraCell, RoundCell
 
 CHANGES = 250
-SHARES = {"pin": 24, "beams": 8, "camera": 8}
-CELLS = {"pin": CallbackCell, "beams": BeamCell, "camera": CameraCell}
+SHARES = {"pin": 20, "beams": 6, "round": 6, "camera": 8}
+CELLS = {"pin": CallbackCell, "beams": BeamCell, "round": RoundCell, "camera": CameraCell}
 
 
 def no_fault(_cell, _rng):
@@ -114,6 +114,7 @@ FAULTS = (no_fault, bent_exchange, bent_exchange, pc_restarts, None)
 OWN_FAULTS = {
     "pin": (touch_beside, pin_bumped),
     "beams": (beam_dark, beams_moved, needle_bent),
+    "round": (beam_dark, beams_moved, needle_bent),
     "camera": (tip_unseen, false_finds, camera_bumped),
 }
 

@@ -232,6 +232,8 @@ def test_the_demo_shows_before_after_drift_and_what_was_sent_on_the_wire(capsys)
         '> $Execute,"TLSet 1, XY(',
     ):
         assert words in shown
+    took = [line for line in shown.splitlines() if "of simulated time" in line]
+    assert len(took) == len(set(took)) >= 1, "said once of each controller"
 
 
 def test_sim_serves_on_a_free_port_until_it_is_terminated():

@@ -175,13 +175,6 @@ class AcceptedChange(DemonstratedChange):
                 exchanges=self.exchanges,
             )
         )
-        if self.simulated_s is not None:
-            say(
-                tr(
-                    "It took {seconds:.1f} s of simulated time, the simulated person's included.",
-                    seconds=self.simulated_s,
-                )
-            )
 
 
 @dataclass(frozen=True, slots=True)

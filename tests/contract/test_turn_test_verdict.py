@@ -249,7 +249,7 @@ def test_whoever_looks_until_it_fits_gets_no_pass():
         concluded(shown(0.1), person)
 
     assert refused.value.code == "proof_contradicts_repeatability"
-    assert "differ by 0.100 mm" in person.asked[-1][0]
+    assert "are 0.100 mm apart" in person.asked[-1][0]
     assert "Measure once more with the camera." not in person.asked[-1][1], "twice at most"
     widened = person.asked[-1][1][-1]
     assert "+-0.107 mm" in widened, "the worst look counts"
@@ -267,7 +267,7 @@ def test_what_was_seen_before_a_break_counts_with_what_is_seen_after_it():
     person = Person(TAKES_BACK)
     with pytest.raises(VerifyError):
         concluded(shown(0.0), person, earlier=[shown(0.1)])
-    assert "differ by" in person.asked[0][0]
+    assert "mm apart" in person.asked[0][0]
 
     controller = controller_of_its_own()
     controller.outcomes.change = "c1"

@@ -83,13 +83,16 @@ class VirtualCell:
         self._history = history
         self._clock = ManualClock()
         self._rng = random.Random(f"cell {history.seed}")
-        self._turns = TurnTaking(self._clock, self._rng, self._note_turn)
+        self._turns = TurnTaking(
+            self._clock, self._rng, lambda name: self._note(f"-- {name} goes on")
+        )
         self._surroundings = SeededSurroundings(self._clock, self._turns, self._rng)
         self._disk = FaultyDisk(folder)
         self._folder = folder
         self._waiting: list[tuple[Disturbance, int]] = []
         self._at_work: VirtualProcess | None = None
         self._others: list[VirtualProcess] = []
+        self._only_power_failed = False
         self._hour = history.hours[0] if history.hours else None
 
     def run(self) -> Story:
@@ -171,9 +174,6 @@ class VirtualCell:
     def _note(self, text: str) -> None:
         self.story.note(self._clock.now_ns(), text.replace(str(self._folder), "DISK"))
 
-    def _note_turn(self, name: str) -> None:
-        self._note(f"-- {name} goes on")
-
     # Disturbances.
 
     def _happen(self, process: VirtualProcess, disturbance: Disturbance, text: str) -> None:
@@ -207,6 +207,7 @@ class VirtualCell:
         if self._disk.lies:
             # The disk reported data as kept that it may have lost: the rest is unreliable.
             self._books.trusted = False
+        self._only_power_failed = self._books.trusted and not (self._hour and self._hour.harms_disk)
         process.alive = False
         self._computer.cut_power(self._clock.now_ns(), self._disk, self._rng.getrandbits(32))
         self._kill(process)
@@ -322,6 +323,7 @@ class VirtualCell:
         self._note(f"journal {self._books.digest()}")
         self._surroundings.wall_jump_s = 0.0
         self._books.trusted = True
+        self._only_power_failed = False
 
     def _arm(self, hour: Hour) -> None:
         for disturbance in hour.disturbances:
@@ -380,7 +382,7 @@ class VirtualCell:
         if isinstance(error, Interrupted) and error.by is not EndedBy.OUTPUT_CLOSED:
             raise error  # a real one: the person who runs this wants it to end
         if not process.alive:
-            self._end(hour, "killed")
+            self.story.endings[f"{hour.deed}: killed"] += 1
             self._rules.killed()
             self._turns.join()
             process.end()
@@ -389,7 +391,8 @@ class VirtualCell:
         self._turns.join()
         process.stopped_ns = stopped_ns if error is None and process.controller else None
         self._rules.ended(process, error, self._plant.state())
-        self._end(hour, "done" if error is None else type(error).__name__)
+        how = "done" if error is None else type(error).__name__
+        self.story.endings[f"{hour.deed}: {how}"] += 1
         self._note("done" if error is None else describe(error))
         process.end()
 
@@ -423,9 +426,6 @@ class VirtualCell:
         finally:
             self._turns.current.owner = None
             process.end()
-
-    def _end(self, hour: Hour, how: str) -> None:
-        self.story.endings[f"{hour.deed}: {how}"] += 1
 
     def _note_said(self, text: str) -> None:
         self._note(f"   {text}")
@@ -463,6 +463,7 @@ class VirtualCell:
             except JournalError as error:
                 why = describe(error)
                 self._note(f"sets the journal aside: {why}")
+                self._rules.hold("JournalKept", not self._only_power_failed, why)
                 process.end()
                 self._books.close()
                 self._computer.set_aside()

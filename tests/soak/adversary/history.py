@@ -135,6 +135,11 @@ class Hour:
     disturbances: tuple[Disturbance, ...]
     line: tuple[str, ...] = ()
 
+    @property
+    def harms_disk(self) -> bool:
+        """Whether something other than a power cut may damage the journal."""
+        return any(one.kind is Hindrance.DISK for one in self.disturbances)
+
 
 @dataclass(frozen=True, slots=True)
 class History:

@@ -131,9 +131,12 @@ RARE: Final[Mapping[str, Sequence[Instant]]] = {
         Instant("wire", "DROP_REPLY", "TLSet 2, XY", 1, _TYPED),
         # A write that is acknowledged but not carried out.
         *(Instant("wire", "IGNORE_WRITE", "TLSet ", 1, _TYPED),) * 2,
+        # The power fails when a write was sent: only what has reached the disk knows of it.
+        Instant("power cut", "", 'wire sent $Execute,"TLSet ', 1, _TYPED),
     ),
     "softmotion": (
         Instant("disk", "lost", ""),
+        Instant("power cut", "", "wire sent WRITE_TOOL", 1, _TYPED),
         Instant("wire", "DROP_REPLY", "WRITE_TOOL", 1, _TYPED),
         # A restart of the PLC after the first reading of a tool, before anything is written.
         Instant("machine", "RESTART", "read_slot"),

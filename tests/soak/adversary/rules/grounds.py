@@ -42,6 +42,7 @@ NAMES: Final = (
     "MovesInItsTool",
     "NothingMovesOn",
     "NothingOutlives",
+    "JournalKept",
 )
 """Every rule, in the order in which they are listed."""
 

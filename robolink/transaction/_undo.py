@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from robolink.errors import ConfigError, ToolChangedError
-from robolink.messages import joined, tr
+from robolink.messages import joined, listed, tr
 from robolink.model import (
     PROOFS,
     Controller,
@@ -58,6 +58,11 @@ class ChangedSince:
     @property
     def sentence(self) -> str:
         """When, by how much, and the usual causes."""
+        return joined(" ", self.findings)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """The same, a sentence each."""
         changed = tr(
             "Tool {tool} holds {now}; on {at} it was left with {recorded}.",
             tool=self.tool,
@@ -71,7 +76,7 @@ class ChangedSince:
             "The usual causes: a program that runs TLSet at its start, an edit on the pendant, a "
             "restored project."
         )
-        return joined(" ", (part for part in (changed, by, causes) if part))
+        return tuple(part for part in (changed, by, causes) if part)
 
 
 def last_proof(controller: Controller, tool: int) -> Recorded | None:
@@ -422,7 +427,9 @@ def _expected(controller: Controller, tool: int, old: ToolOffset | None) -> Tool
     changed = changed_since(controller, tool, now)
     if changed is not None and not controller.tools.same(now, old):
         raise ToolChangedError(
-            changed.sentence,
+            listed(
+                tr("Something else has changed tool {tool}:", tool=changed.tool), changed.findings
+            ),
             remedy=tr(
                 "Nothing was written. Find out who changed it, then use 'robolink tool set'."
             ),

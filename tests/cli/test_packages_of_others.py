@@ -63,7 +63,7 @@ def test_it_is_named_with_its_package_and_ends_with_2(acme, capsys):
     assert error["what"] == (
         "acme_robots.driver, of the installed package acme-robots 2.1, failed: KeyError: 'dongle'"
     )
-    assert error["remedy"].endswith("report it to the makers of acme-robots 2.1.")
+    assert error["remedy"].endswith("then tell the makers of acme-robots 2.1.")
 
 
 def test_the_traceback_shows_where(acme, capsys, monkeypatch):

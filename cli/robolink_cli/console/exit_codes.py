@@ -281,7 +281,7 @@ def _sentences(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
         remedy = tr("Set ROBOLINK_DEBUG=1 to see where, and report it with the output.")
     else:
         remedy = tr(
-            "Set ROBOLINK_DEBUG=1 to see where, and report it to the makers of {package}.",
+            "Set ROBOLINK_DEBUG=1 to see where, then tell the makers of {package}.",
             package=plug_in.package,
         )
     return unexpected(error), remedy

@@ -62,7 +62,7 @@ def damaged_error(found: str, name: str, consequence: str) -> JournalError:
         name: Which journal, as a person is told.
         consequence: What it means for the controller, one sentence.
     """
-    cause = tr("it is damaged ({text})", text=found.rstrip("."))
+    cause = tr("it is damaged ({text})", text=" ".join(found.split()).rstrip("."))
     return JournalError(
         listed(tr("The journal {name} cannot be used:", name=name), [cause]),
         remedy=joined(" ", filter(None, (consequence, _move_it_away()))),

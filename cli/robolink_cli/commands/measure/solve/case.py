@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, TypeVar, cast, get_args, get_origin
 
 from robolink import calibration as cal
 from robolink.errors import CalibrationError, ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import Hand, Pose, ToolOffset, WorkBox
 
 EULER: Final = "R=Rz(U)Ry(V)Rx(W)"
@@ -117,10 +117,12 @@ class Node:
             ConfigError: It is another.
         """
         value = self.raw(name)
-        if not isinstance(value, str) or (allowed and value not in allowed):
-            raise unusable(
-                self.at(name),
-                tr("{value!r} is not one of: {words}", value=value, words=", ".join(allowed)),
+        if not isinstance(value, str):
+            raise unusable(self.at(name), tr("{value!r} is not a text", value=value))
+        if allowed and value not in allowed:
+            raise ConfigError(
+                tr("{path}: {value!r} is not known.", path=self.at(name), value=value),
+                remedy=known_names(allowed, value),
             )
         return value
 

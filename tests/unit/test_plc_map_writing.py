@@ -209,8 +209,26 @@ def test_a_plc_that_refuses_in_the_recovery_gets_its_old_registers_back(commit_b
             recover(controller)
         assert controller.tools.read(1) == before
         (finding,) = recover(controller).settled
-        assert finding.verdict is Verdict.NOT_APPLIED
+        assert finding.verdict is Verdict.NOT_FINISHED
         assert not controller.outcomes.open_markers()
+
+
+def test_old_values_in_the_registers_do_not_prove_that_the_plc_uses_them(commit_bit):
+    """A roll-back that a failing journal could not record wrote them, and asked for nothing."""
+    bench, span = commit_bit, commit_bit.map.slots[1].span
+    with bench.connect() as controller:
+        before = controller.tools.read(1)
+        old = bench.client.read_holding(span.start, len(span))
+        bench.client.lose = {2}
+        with pytest.raises(OutcomeUnknownError):
+            controller.tools.write(1, NEW, expected=ANY)
+    assert bench.program.in_force[1]["x"] == NEW.x_mm
+    bench.plc.program.memory.write(RegisterTable.HOLDING, span.start, list(old))
+    with bench.connect() as controller:
+        (finding,) = recover(controller).settled
+        assert finding.verdict is Verdict.NOT_FINISHED
+        assert controller.tools.read(1) == before
+    assert bench.program.in_force[1]["x"] == before.x_mm
 
 
 @pytest.mark.parametrize("write", range(3))

@@ -293,15 +293,21 @@ class RegisterResolver(MarkerResolver):
         """Judge a write.
 
         Registers that hold the new value do not prove that the PLC took it over: the process
-        may have died between the values and the request.
+        may have died between the values and the request. Nor does the old value prove that it is
+        in force: a roll-back that a failing journal could not record may have written it, and the
+        PLC still uses what it had taken over before.
         """
         if marker.kind is not MarkerKind.SET or "tool" not in marker.details:
             return None
         finding = examine_write(self._registers, marker)
-        if finding.verdict is not Verdict.DONE or not self._registers.handshake.answers:
+        if finding.verdict is Verdict.CONFLICT or not self._registers.handshake.answers:
             return finding
-        sentence = tr(
-            "{holds} robolink could not confirm that the PLC accepted it.", holds=finding.sentence
-        )
+        if finding.verdict is Verdict.DONE:
+            holds = finding.sentence
+        else:
+            holds = tr(
+                "The registers of tool {tool} hold the old value.", tool=marker.details["tool"]
+            )
+        sentence = tr("{holds} robolink could not confirm that the PLC accepted it.", holds=holds)
         action = tr("ask the PLC again to accept the values in the registers")
         return replace(finding, verdict=Verdict.NOT_FINISHED, sentence=sentence, action=action)

@@ -207,7 +207,7 @@ class VirtualCell:
         if self._disk.lies:
             # The disk reported data as kept that it may have lost: the rest is unreliable.
             self._books.trusted = False
-        self._only_power_failed = self._books.trusted and not (self._hour and self._hour.harms_disk)
+        self._only_power_failed = self._books.trusted and not self._history.harms_disk(self._hour)
         process.alive = False
         self._computer.cut_power(self._clock.now_ns(), self._disk, self._rng.getrandbits(32))
         self._kill(process)

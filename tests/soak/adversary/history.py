@@ -135,11 +135,6 @@ class Hour:
     disturbances: tuple[Disturbance, ...]
     line: tuple[str, ...] = ()
 
-    @property
-    def harms_disk(self) -> bool:
-        """Whether something other than a power cut may damage the journal."""
-        return any(one.kind is Hindrance.DISK for one in self.disturbances)
-
 
 @dataclass(frozen=True, slots=True)
 class History:
@@ -154,6 +149,18 @@ class History:
     seed: int
     kind: CellKind
     hours: tuple[Hour, ...]
+
+    def harms_disk(self, hour: Hour | None) -> bool:
+        """Whether something besides a power cut may have damaged the journal in an hour.
+
+        What a disk that lied in an earlier one has not stored, any later cut loses.
+        """
+        return hour is None or any(
+            one.what == "SYNC_LIES" or (one.kind is Hindrance.DISK and other == hour)
+            for other in self.hours
+            if other.number <= hour.number
+            for one in other.disturbances
+        )
 
     def without_hours(self, dropped: Sequence[int]) -> Self:
         """Return it without some hours, by number."""

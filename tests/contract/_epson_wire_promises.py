@@ -1,10 +1,14 @@
 """What each movement on an EPSON controller's wire must be proved by, read from the wire itself."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Final
 
+from robolink_simulators.epson.device import EpsonSimulator
+
+from robolink.model import Controller
 from robolink.timing import NS_PER_S
 
 Line = tuple[int, str, str]
@@ -45,6 +49,30 @@ class Exchange:
     answered_ns: int = 0
     answer: str = ""
     meanwhile: list["Exchange"] = field(default_factory=list)
+
+
+def sent(simulator: EpsonSimulator, begun: int = 0) -> list[str]:
+    """Return the requests that a simulator has got, from an entry of its log on."""
+    return [text for _, way, text in list(simulator.log)[begun:] if way == ">"]
+
+
+def settings_in(requests: Iterable[str]) -> list[str]:
+    """Return the statements that set power, speed or acceleration."""
+    words = ("Power", "Speed", "Accel")
+    return [text[10:-1] for text in requests if text[10:].startswith(words)]
+
+
+def _stop(controller: Controller) -> None:
+    controller.stop()
+    controller.release_stop()
+
+
+SETS_BACK: Final[Mapping[str, Callable[[Controller], None]]] = {
+    "stop": _stop,
+    "reset": lambda controller: controller.reset_fault(),
+    "motors": lambda controller: controller.motors(True),
+}
+"""What sets power, speed and acceleration back on a controller, or may."""
 
 
 def movements(log: Iterable[Line]) -> int:

@@ -27,6 +27,7 @@ from robolink.errors import (
 from robolink.methods import BeamsParameters
 from robolink.methods.beams.drive import require_run_up
 from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, Verdict, WorkBox
+from tests.contract._epson_wire_promises import SETS_BACK, sent, settings_in
 from tests.contract.conftest import served
 
 pytestmark = [pytest.mark.simulator_only]
@@ -68,14 +69,6 @@ def down(controller, *, run_on=False):
 def plate(simulator):
     below_mm = simulator.world.tip_mm()[2] - PLATE_BELOW_MM
     simulator.world.connect(INPUT, TouchPlate(below_mm))
-
-
-def sent(simulator, begun=0):
-    return [text for _, way, text in list(simulator.log)[begun:] if way == ">"]
-
-
-def settings_in(requests):
-    return [text[10:-1] for text in requests if text[10:].startswith(("Power", "Speed", "Accel"))]
 
 
 def accel_s(simulator, *values):
@@ -132,18 +125,12 @@ def test_a_movement_takes_no_request_more(comma):
     assert len(set(each)) <= 1, each
 
 
-@pytest.mark.parametrize("act", ["stop", "reset", "motors"])
+@pytest.mark.parametrize("act", SETS_BACK)
 def test_after_a_stop_a_reset_or_motor_on_it_is_set_anew_although_it_reads_right(act):
     with opened() as (simulator, controller):
         lift(controller)
         begun = len(simulator.log)
-        if act == "stop":
-            controller.stop()
-            controller.release_stop()
-        elif act == "reset":
-            controller.reset_fault()
-        else:
-            controller.motors(True)
+        SETS_BACK[act](controller)
         lift(controller)
         anew = ["Power Low", "Speed 5", "SpeedS 20.000", "AccelS 150.000, 150.000"]
         assert settings_in(sent(simulator, begun))[-4:] == anew

@@ -17,6 +17,7 @@ from robolink_simulators.faults import Fault, FaultAction
 from robolink.controllers.epson.movement import Settings
 from robolink.errors import NotReadyError, RemoteProtocolError, TransportClosedError
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
+from tests.contract._epson_wire_promises import SETS_BACK, sent, settings_in
 
 pytestmark = [pytest.mark.simulator_only]
 
@@ -29,14 +30,6 @@ def lift(controller, dz_mm=0.5):
     here = group.pose()
     motion = group.move_to(replace(here, z_mm=here.z_mm + dz_mm), STRAIGHT, box=WorkBox())
     return motion.wait(timeout_s=60)
-
-
-def sent(simulator, begun=0):
-    return [text for _, way, text in list(simulator.log)[begun:] if way == ">"]
-
-
-def settings_in(requests):
-    return [text[10:-1] for text in requests if text[10:].startswith(("Power", "Speed"))]
 
 
 @pytest.fixture(params=COMMAS)
@@ -82,18 +75,12 @@ def test_the_tool_or_the_motors_that_changed_since_the_last_movement_stop_the_ne
     assert simulator.machine.arm.moves_started == moves
 
 
-@pytest.mark.parametrize("act", ["stop", "reset", "motors"])
+@pytest.mark.parametrize("act", SETS_BACK)
 def test_after_a_stop_a_reset_or_motor_on_all_is_set_anew_although_it_reads_right(served, act):
     simulator, controller = served
     lift(controller)
     begun = len(simulator.log)
-    if act == "stop":
-        controller.stop()
-        controller.release_stop()
-    elif act == "reset":
-        controller.reset_fault()
-    else:
-        controller.motors(True)
+    SETS_BACK[act](controller)
     controller.groups[0].settings.look()
     lift(controller)
     assert settings_in(sent(simulator, begun))[-3:] == ["Power Low", "Speed 5", "SpeedS 20.000"]

@@ -38,13 +38,14 @@ class Desk:
 
     Args:
         now_s: A monotonic clock of this computer, in seconds.
+        after: Number of what was shown last: a press of then does not answer a question of now.
     """
 
-    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, now_s: Callable[[], float] = time.monotonic, after: int = 0) -> None:
         self._now_s = now_s
         self._happened: queue.SimpleQueue[Happening] = queue.SimpleQueue()
         self._answers: queue.SimpleQueue[SendAnswer] = queue.SimpleQueue()
-        self._number = 0
+        self._number = after
         self._told_waiting = False
         self._gone = False
         self._looked_s = 0.0

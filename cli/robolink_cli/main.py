@@ -28,7 +28,7 @@ from robolink_cli.console.render import dumps, json_is_on, note, print_document,
 from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.lazy_group import FrontPage
 from robolink_cli.options.shared import TYPED, all_shared
-from robolink_cli.prompts.person import person_here
+from robolink_cli.prompts.person import Person, person_here
 
 if TYPE_CHECKING:
     from robolink_cli.stopping.request import StopRequest
@@ -180,6 +180,15 @@ def _explained(error: BaseException) -> BaseException:
 def _invoke(arguments: Sequence[str]) -> int:
     if not arguments and person_here():
         arguments = ["change"]  # without arguments, ask what to do
+    if person_here() is not Person.WIRE:
+        return _carried_out(arguments)
+    from robolink_cli.wizard.host import whole_command
+    from robolink_cli.wizard.state import Header
+
+    return whole_command(Header("", " ".join(arguments[:1])), lambda: _carried_out(arguments))
+
+
+def _carried_out(arguments: Sequence[str]) -> int:
     colour = colour_wanted()
     width = help_width()
     with _root().make_context(

@@ -25,6 +25,7 @@ from robolink_cli.wizard.happenings import (
     HasEnded,
     KeyPressed,
     LineTyped,
+    OffersAtTheEnd,
     Pressed,
     Reading,
     SendAnswer,
@@ -119,6 +120,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
     if isinstance(subject, CellIs):
         return _known(state, subject.simulated, subject.needle)
+    if isinstance(subject, OffersAtTheEnd):
+        return replace(state, offers=subject.offers)
     if isinstance(subject, TaughtPoints):
         return replace(state, impact=subject.impact)
     if isinstance(subject, ChangeReport):

@@ -210,4 +210,15 @@ class WizardCommand(Enum):
     """Choose another job, starting at the first list."""
 
 
+@dataclass(frozen=True, slots=True)
+class OffersAtTheEnd:
+    """What the last screen offers beside leaving it, where the job is carried out.
+
+    Attributes:
+        offers: That.
+    """
+
+    offers: frozenset[WizardCommand]
+
+
 Effect = SendAnswer | WizardCommand

@@ -5,7 +5,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 import click
@@ -159,16 +159,20 @@ T = TypeVar("T")
 class Work(Generic[T]):
     """The work of one command in its thread.
 
+    Args:
+        do: The work.
+        context: The command's; by default that of the caller, if there is one by now.
+
     Attributes:
         result: What it returned.
         error: What ended it.
     """
 
-    def __init__(self, do: Callable[[], T]) -> None:
+    def __init__(self, do: Callable[[], T], context: click.Context | None = None) -> None:
         self._do = do
         self._ended = threading.Event()
         self._begun = threading.Event()
-        self._click = click.get_current_context()
+        self._click = context or click.get_current_context(silent=True)
         self.result: T | None = None
         self.error: BaseException | None = None
 
@@ -187,9 +191,12 @@ class Work(Generic[T]):
         """Wait for its end for so long; return whether it has come."""
         return self._ended.wait(seconds)
 
+    def _scope(self) -> AbstractContextManager[object]:
+        return nullcontext() if self._click is None else self._click.scope(cleanup=False)
+
     def _run(self) -> None:
         try:
-            with self._click.scope(cleanup=False), heard_by_this_thread():
+            with self._scope(), heard_by_this_thread():
                 self._begun.set()
                 self.result = self._do()
         except BaseException as error:

@@ -21,6 +21,7 @@ from robolink.transport import parse_url
 from robolink_cli.access.change_page import reports_from
 from robolink_cli.commands.record.journal_lookup import entries_of_change
 from robolink_cli.panel.cards import ChangeRow, ChartCard
+from robolink_cli.views.journal import who
 
 MOST_ROWS: Final = 25
 """Largest number of changes on the page, the newest first: ``robolink journal list`` has all."""
@@ -113,7 +114,7 @@ def _rows(journal: Journal, address: str) -> Iterator[ChangeRow]:
 def _row(change: str, entries: Sequence[Recorded]) -> ChangeRow:
     """Return a change in one row; one that cannot be understood is told as such."""
     first = entries[0]
-    when, who = local_label(first.at), first.signature.operator or first.signature.user
+    when, person = local_label(first.at), who(first)
     try:
         # The chain of the whole journal is checked when the page of a change is opened.
         reports = reports_of(
@@ -125,13 +126,13 @@ def _row(change: str, entries: Sequence[Recorded]) -> ChangeRow:
         )
     except (ConfigError, KeyError, TypeError, ValueError):
         word = tr("cannot be read")
-        return ChangeRow(change, when, who, "", "", "", "", "bad", word, report=False)
+        return ChangeRow(change, when, person, "", "", "", "", "bad", word, report=False)
     head = heading(reports)
     mark = {"good": "ok", "still": "look"}.get(head.tone, "bad")
     return ChangeRow(
         change,
         when,
-        who,
+        person,
         _what(reports, first.signature.nozzle),
         _largest(one.fit.rms_mm for one in reports if one.fit is not None),
         _largest(

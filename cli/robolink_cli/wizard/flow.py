@@ -11,7 +11,6 @@ from robolink.calibration_run import ChangeReport
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.runner import (
-    SETTLING_S,
     FitSubject,
     JogSubject,
     MoveSubject,
@@ -38,6 +37,7 @@ from robolink_cli.wizard.happenings import (
     WizardCommand,
 )
 from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of
+from robolink_cli.wizard.places import not_yet
 from robolink_cli.wizard.questions_flow import (
     answered_by_key,
     answered_by_line,
@@ -47,7 +47,6 @@ from robolink_cli.wizard.questions_flow import (
 )
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
-    LEAST_WAY_MM,
     STEP_SIZES,
     CheckSubject,
     ChoiceSubject,
@@ -88,35 +87,6 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
             return _line(state, happening)
         case KeyPressed():
             return _key(state, happening)
-
-
-def not_yet(state: WizardState, at_s: float) -> str:
-    """Return why the place is refused so far, as known here; empty for nothing."""
-    touch, jogging = state.touch, state.jogging
-    if touch is None:
-        return ""
-    if at_s - jogging.ended_s < SETTLING_S:
-        return tr("Wait: the robot is still moving.")
-    arrived = touch.arrival is not None or state.carried
-    if touch.contact is None and arrived and not _brought(state):
-        return tr("Not yet: the tip is still where the robot stopped. Jog it onto the pin.")
-    if touch.contact is None and jogging.coarse:
-        return tr(
-            "Not yet: the last step was {mm} mm. Finish with 0.10 mm or less.",
-            mm=f"{jogging.longest:.2f}",
-        )
-    reading = state.reading
-    if reading is not None and at_s - reading.at_s > 1.0:
-        return tr("No reading from the controller for {s} s.", s=round(at_s - reading.at_s))
-    return ""
-
-
-def _brought(state: WizardState) -> bool:
-    """Return whether the tip was moved from where the robot stopped."""
-    way = state.way_mm()
-    if way is None:
-        return state.jogging.steps > 0
-    return max(map(abs, way)) >= LEAST_WAY_MM / 2 and state.jogging.steps > 0
 
 
 def _regarding(state: WizardState, subject: object) -> WizardState:
@@ -193,6 +163,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         subject=subject,
         reading=reading,
         question=asked,
+        asked=asked.number,
         fresh=(),
         heard=state.fresh,
         page=0,

@@ -13,8 +13,8 @@ from robolink.errors import RobolinkError
 from robolink_cli.console.output import PLAIN, shown_by
 from robolink_cli.console.render import note
 from robolink_cli.prompts.current_desk import sitting_at
+from robolink_cli.wizard.ending import ended_of, kept_lines
 from robolink_cli.wizard.happenings import WizardCommand
-from robolink_cli.wizard.screens.end import ended_of, kept_lines
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Desk, Face, Work
 

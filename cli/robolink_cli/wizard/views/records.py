@@ -151,11 +151,14 @@ class CheckView:
         rows: The list.
         plan: What the robot will do.
         open: How many rows are still open.
+        marked: Index of the row that is marked, of those with a name; their count for the start;
+            ``None`` for none.
     """
 
     rows: tuple[CheckRow, ...]
     plan: str
     open: int
+    marked: int | None = None
 
 
 Point = tuple[float, float]
@@ -283,6 +286,11 @@ class TouchView:
         pad: The jog pad.
         typed: The pose that was typed and is taken next; empty for none.
         free: Whether nothing is measured: the person only jogs.
+        contact: How contact shows; empty where nothing is touched. It is among the notes too, and
+            so are the next three.
+        height: Height against the first touch; empty where nothing is compared with it.
+        lowest, highest: How far a free jog may go, X, Y and Z; empty for any other.
+        next_u_deg: The angle at which the turn test is touched now; ``None`` where nobody knows.
     """
 
     instruction: tuple[str, ...]
@@ -294,6 +302,11 @@ class TouchView:
     pad: JogPad
     typed: str = ""
     free: bool = False
+    contact: str = ""
+    height: str = ""
+    lowest: tuple[str, ...] = ()
+    highest: tuple[str, ...] = ()
+    next_u_deg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -404,8 +417,9 @@ class EndView:
         blocked: Whether the robot accepts only ``recover``.
         change: Id of the change; empty without one.
         angles: What the turn test showed, for a picture of before and after.
-        before_mm, after_mm: How far the tip was off before and after the change, by the turn
-            test; ``None`` where there was none.
+        before_mm: How far the old value was off the tip that was measured; ``None`` without an
+            old value, or without a turn test.
+        after_mm: How far the new one is off at most, by the turn test; ``None`` without one.
         limit_mm: What the turn test was held to; ``None`` without one.
     """
 

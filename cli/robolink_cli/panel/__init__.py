@@ -1,1 +1,1 @@
-"""The panel: pages for a tablet at the cell. One process serves them, one more does each job."""
+"""The panel: pages for a tablet at the cell."""

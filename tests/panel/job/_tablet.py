@@ -6,7 +6,9 @@ import socket
 import threading
 import time
 from contextlib import suppress
+from typing import Any
 
+from robolink_cli import job_process
 from robolink_cli.wizard.views.records import (
     CheckView,
     ChoiceView,
@@ -39,7 +41,9 @@ class Tablet:
     """
 
     def __init__(self, wire, *, lives=True):
-        self.wire, self.view, self.views, self.told, self.left = wire, None, [], [], None
+        self.wire, self.views, self.told = wire, [], []
+        self.view: Any = None
+        self.left: Any = None
         self.came_s = []
         self._held = b""
         self._lock = threading.Lock()
@@ -229,7 +233,7 @@ def at_the_wire(arguments, script, *, lives=True):
 
     thread = threading.Thread(target=play, daemon=True)
     thread.start()
-    code = job.run(theirs, arguments)
+    code = job_process.run(theirs, arguments)
     thread.join(30.0)
     if failed:
         raise failed[0]

@@ -44,6 +44,8 @@ def test_a_whole_change_is_carried_out_and_proved(cell):
     assert (code, tablet.left["code"]) == (0, 0)
     assert isinstance(end, EndView)
     assert end.done
+    assert end.after_mm is not None
+    assert end.before_mm is not None
     assert end.after_mm < 0.1 < end.before_mm
     after, tip = simulator.machine.tools.get(1), simulator.world.tips[1]
     assert abs(after.x_mm - before.x_mm) + abs(after.y_mm - before.y_mm) > 0.2

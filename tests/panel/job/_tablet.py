@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from robolink_cli import job_process
@@ -20,6 +21,7 @@ from robolink_cli.wizard.views.records import (
 )
 from robolink_cli.wizard.views.wire import from_wire
 
+RECIPE = Path(__file__).parents[3] / "examples" / "recipes" / "needle-one-touch.toml"
 SIZES = (5.0, 1.0, 0.5, 0.1, 0.01)
 
 
@@ -210,6 +212,13 @@ def change(tablet, eyes, needle="N-0418"):
             case EndView():
                 return body
         tablet.goes_on(number)
+
+
+def to_the_jog(tablet):
+    """Agree to a jog by hand, and wait for its pad."""
+    tablet.body(QuestionView)
+    tablet.press("yes")
+    tablet.body(TouchView)
 
 
 def at_the_wire(arguments, script, *, lives=True):

@@ -72,6 +72,11 @@ class WireLink:
         with self._lock:
             return self._lease.held(time.monotonic())
 
+    def spend_sign(self) -> bool:
+        """Return whether the next step of the held key may begin now, once for each sign."""
+        with self._lock:
+            return self._lease.spend(time.monotonic())
+
     def end_held(self) -> None:
         """End what is held."""
         with self._lock:

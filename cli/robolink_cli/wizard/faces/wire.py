@@ -101,6 +101,8 @@ class WireFace:
             return
         if not state.waits or now_s - question.at_s < ARMED_AFTER_S:
             return
+        if not self._link.spend_sign():
+            return
         step = min(state.jogging.step, LONGEST_HELD_STEP)
         self._happens(Pressed(hold.number, "jog", f"{hold.axis}{step:g}", now_s))
         self._stepped = None if self._state.waits else state.jogging.steps

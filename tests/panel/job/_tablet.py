@@ -7,6 +7,7 @@ import threading
 import time
 from contextlib import suppress
 
+from robolink_cli import job_process
 from robolink_cli.wizard.views.records import (
     CheckView,
     ChoiceView,
@@ -221,7 +222,7 @@ def at_the_wire(arguments, script, *, lives=True):
 
     thread = threading.Thread(target=play, daemon=True)
     thread.start()
-    code = job.run(theirs, arguments)
+    code = job_process.run(theirs, arguments)
     thread.join(30.0)
     if failed:
         raise failed[0]

@@ -86,8 +86,12 @@ def fit_drawing(fit: FitView, tr: Tr) -> Markup:
     band = fit.limit_mm * per_mm
     parts: list[Element] = [
         element(
-            "rect", x=f"{left:g}", y=f"{middle - band:.2f}", width=f"{wide:g}",
-            height=f"{2 * band:.2f}", class_="band",
+            "rect",
+            x=f"{left:g}",
+            y=f"{middle - band:.2f}",
+            width=f"{wide:g}",
+            height=f"{2 * band:.2f}",
+            class_="band",
         )
     ]
     for value in (fit.limit_mm, 0.0, -fit.limit_mm):
@@ -109,8 +113,13 @@ def fit_drawing(fit: FitView, tr: Tr) -> Markup:
 def _frame(x: float, top: float, gap: float, high: float) -> Element:
     half = min(gap * 0.46, 60.0)
     return element(
-        "rect", x=f"{x - half:.2f}", y=f"{top:g}", width=f"{2 * half:.2f}", height=f"{high:g}",
-        rx="8", class_="worst",
+        "rect",
+        x=f"{x - half:.2f}",
+        y=f"{top:g}",
+        width=f"{2 * half:.2f}",
+        height=f"{high:g}",
+        rx="8",
+        class_="worst",
     )
 
 
@@ -130,8 +139,12 @@ def _sign(axis: str, at: Point, size: float = 9.0) -> Element:
         return circle(at, size, "axis-x")
     if axis == "y":
         return element(
-            "rect", x=f"{x - size:.2f}", y=f"{y - size:.2f}", width=f"{2 * size:g}",
-            height=f"{2 * size:g}", class_="axis-y",
+            "rect",
+            x=f"{x - size:.2f}",
+            y=f"{y - size:.2f}",
+            width=f"{2 * size:g}",
+            height=f"{2 * size:g}",
+            class_="axis-y",
         )
     corners = ((x, y - 1.2 * size), (x - 1.1 * size, y + size), (x + 1.1 * size, y + size))
     return element(
@@ -154,8 +167,12 @@ def turn_drawing(end: EndView, tr: Tr) -> Markup:
         kind = "over" if one.within is False else "in"
         parts.append(
             element(
-                "rect", x=f"{x - 22:.2f}", y=f"{high - tall:.2f}", width="44",
-                height=f"{tall:.2f}", class_=f"bar {kind}",
+                "rect",
+                x=f"{x - 22:.2f}",
+                y=f"{high - tall:.2f}",
+                width="44",
+                height=f"{tall:.2f}",
+                class_=f"bar {kind}",
             )
         )
         name = f"U {one.u_deg:.0f}"
@@ -164,8 +181,9 @@ def turn_drawing(end: EndView, tr: Tr) -> Markup:
         y = high - limit / reach * (high - 12)
         parts.append(line((left, y), (_WIDE - 12, y), class_="limit"))
         parts.append(words(f"{limit:g}", left - 8, y + 6, class_="tick", text_anchor="end"))
-    return _svg(tr("Turn test: how far the tip was off at each angle, in mm"), _WIDE, high + foot,
-                parts)
+    return _svg(
+        tr("Turn test: how far the tip was off at each angle, in mm"), _WIDE, high + foot, parts
+    )
 
 
 def before_after_drawing(end: EndView, tr: Tr) -> Markup:
@@ -181,7 +199,11 @@ def before_after_drawing(end: EndView, tr: Tr) -> Markup:
         parts.append(words(name, 0, y + 28, class_="name"))
         parts.append(
             element(
-                "rect", x=f"{left:g}", y=f"{y:g}", width=f"{long:.2f}", height="40",
+                "rect",
+                x=f"{left:g}",
+                y=f"{y:g}",
+                width=f"{long:.2f}",
+                height="40",
                 class_=f"bar {kind}",
             )
         )

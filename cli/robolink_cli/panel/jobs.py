@@ -101,7 +101,7 @@ class Job:
         end: How it ended; ``None`` while it runs.
     """
 
-    program = "robolink_cli.panel.job"
+    program = "robolink_cli.job_process"
     """The module that is run."""
 
     def __init__(

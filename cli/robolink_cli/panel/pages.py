@@ -69,7 +69,13 @@ _PLACES: Final = {
     "turn+": "\u27f2",
     "turn-": "\u27f3",
 }
-_MARKS: Final = {"ok": "\u25a0", "look": "\u25b2", "you": "\u25b2", "to do": "\u25b2", "bad": "\u2715"}
+_MARKS: Final = {
+    "ok": "\u25a0",
+    "look": "\u25b2",
+    "you": "\u25b2",
+    "to do": "\u25b2",
+    "bad": "\u2715",
+}
 _UNKNOWN: Final = "?"
 _ORDER: Final = (Weight.LEAVES, Weight.PLAIN, Weight.MAIN)
 
@@ -97,11 +103,11 @@ class Watcher:
     @property
     def presses(self) -> bool:
         """Whether what is pressed here is heard."""
-        return self.seat == HERE
+        return self.seat == HERE and self.may_take
 
     @property
     def may_take(self) -> bool:
-        """Whether this person may take the seat."""
+        """Whether this person may have the seat."""
         return self.role not in ("", ONLOOKER)
 
 
@@ -162,9 +168,15 @@ class Pages:
         if kind not in PAGES:
             raise KeyError(kind)
         given: dict[str, Any] = {
-            "token": "", "cell": "", "number": 0, "onward": "/", "names": (), "parts": None,
+            "token": "",
+            "cell": "",
+            "number": 0,
+            "onward": "/",
+            "names": (),
+            "parts": None,
         }
         given |= data
+        given["onward"] = _inside(given["onward"])
         if kind == "overview" and given["parts"] is None:
             given["parts"] = self.overview(given["cells"], watcher)
         live = kind in ("cell", "overview")
@@ -198,6 +210,12 @@ class Pages:
             "other": ENGLISH if watcher.language == CHINESE else CHINESE,
             **values,
         }
+
+
+def _inside(onward: str) -> str:
+    """Return a page of this panel; the first one where that is none."""
+    inside = onward.startswith("/") and onward[1:2] not in ("/", "\\") and onward.isprintable()
+    return onward if inside else "/"
 
 
 def _words(language: str) -> Callable[..., str]:

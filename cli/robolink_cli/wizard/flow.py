@@ -25,6 +25,8 @@ from robolink_cli.wizard.happenings import (
     HasEnded,
     KeyPressed,
     LineTyped,
+    OffersAtTheEnd,
+    Pressed,
     Reading,
     SendAnswer,
     TaughtPoints,
@@ -39,8 +41,10 @@ from robolink_cli.wizard.happenings import (
 from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of
 from robolink_cli.wizard.places import not_yet
 from robolink_cli.wizard.questions_flow import (
+    PRESSED_AT_THE_END,
     answered_by_key,
     answered_by_line,
+    answered_by_press,
     chosen_by_key,
     chosen_by_line,
     into_field,
@@ -56,6 +60,8 @@ from robolink_cli.wizard.state import (
     WizardState,
     subject_of,
 )
+from robolink_cli.wizard.views.offered import refusal
+from robolink_cli.wizard.views.view import view_of
 
 Advanced = tuple[WizardState, list[Effect]]
 
@@ -87,6 +93,8 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
             return _line(state, happening)
         case KeyPressed():
             return _key(state, happening)
+        case Pressed():
+            return _press(state, happening)
 
 
 def _regarding(state: WizardState, subject: object) -> WizardState:
@@ -112,6 +120,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
     if isinstance(subject, CellIs):
         return _known(state, subject.simulated, subject.needle)
+    if isinstance(subject, OffersAtTheEnd):
+        return replace(state, offers=subject.offers)
     if isinstance(subject, TaughtPoints):
         return replace(state, impact=subject.impact)
     if isinstance(subject, ChangeReport):
@@ -251,6 +261,45 @@ def _key(state: WizardState, key: KeyPressed) -> Advanced:
     if state.at_place:
         return _key_at_place(state, key)
     return _taken(state, answered_by_key(state, key))
+
+
+def _press(state: WizardState, press: Pressed) -> Advanced:
+    """Carry out what a view offered; anything else only says why it does nothing."""
+    why = refusal(view_of(state, press.at_s), press)
+    if why:
+        return state.says(why), []
+    shown_s = state.question.at_s if state.question is not None else -math.inf
+    if state.ended is not None:
+        shown_s = state.ended.at_s
+    ends = press.action == "leave" and state.ended is None
+    if press.at_s - shown_s < ARMED_AFTER_S and not ends:
+        return state.says(tr("Pressed too early and ignored. Press it again.")), []
+    if state.ended is not None:
+        return _last(state, PRESSED_AT_THE_END[press.action])
+    if ends:
+        return _stop(state)
+    if state.at_place:
+        return _press_at_place(state, press)
+    return _taken(state, answered_by_press(state, press))
+
+
+def _press_at_place(state: WizardState, press: Pressed) -> Advanced:
+    jogging, value = state.jogging, press.value
+    match press.action:
+        case "jog":
+            return _jog(state, value, press.at_s)
+        case "size":
+            sized = replace(jogging, size=STEP_SIZES.index(float(value)))
+            return replace(state, jogging=sized, message=""), []
+        case "turn":
+            turned = replace(jogging, quarters=(jogging.quarters + 1) % 4)
+            return replace(state, jogging=turned, message=""), []
+        case "again":
+            return _again(state, int(value) if value else None)
+        case "pose":
+            return _pose_typed(state, value)
+        case _:
+            return _take(state, press.at_s)
 
 
 def stops_at_once(state: WizardState, name: str) -> bool:

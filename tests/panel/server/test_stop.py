@@ -133,7 +133,7 @@ def test_a_stop_that_hangs_holds_no_later_press_up():
         carrier.may_end.clear()
         desk = StopDesk(carrier, now)
         hangs = asyncio.ensure_future(desk.press("p", 0, LINE3))
-        await asyncio.sleep(0)
+        await asyncio.sleep(0.01)
         now.now_s += 1.5
         again = asyncio.ensure_future(desk.press("q", 0, LINE3))
         await asyncio.sleep(0.01)
@@ -191,16 +191,17 @@ def test_one_cells_press_is_no_press_of_another_cell():
 
 
 @pytest.fixture
+def state_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "state"
+
+
+@pytest.fixture
 def robot(state_folder):
     simulator = EpsonSimulator("T6-602S", seed=3)
     with serve_tcp(simulator, clock=ScaledClock(20)) as host:
         yield simulator, host.url
-
-
-@pytest.fixture(scope="module")
-def ready():
-    with StopProcess() as carry_out:
-        yield carry_out
 
 
 def stopped(carry_out, url, language="en"):
@@ -208,10 +209,6 @@ def stopped(carry_out, url, language="en"):
         return await asyncio.wait_for(carry_out(StopAsked(url, "mei", language)), 20)
 
     return asyncio.run(work())
-
-
-def aborts(simulator):
-    return sum("$Abort" in str(line) for line in simulator.log.lines())
 
 
 @pytest.fixture

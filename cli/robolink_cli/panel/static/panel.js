@@ -8,6 +8,7 @@ const HOLD_MS = 350; // a shorter press of a jog key is one step
 const BEAT_MS = 100, LEASE_MS = 250; // of a held key; the job has a clock of its own
 const STOP_MS = 500; // a STOP that nothing confirms by then has failed, for all anybody knows
 const STOP_OLD_MS = 5000;
+const REMOVED = 4003, CHANGED = 4001; // why the server closed the stream
 const SLEEP_MS = 60000, WAKE_MS = 700; // the first touch after a rest only wakes
 const place = (id) => document.getElementById(id);
 const page = document.body, data = page.dataset, live = "live" in data;
@@ -15,7 +16,7 @@ const now = () => performance.now();
 const identity = () => Array.from(crypto.getRandomValues(new Uint8Array(12)), (b) => b.toString(16).padStart(2, "0")).join("");
 
 // The stream. Whatever is heard proves that it lives; a whole screen must have come by it too.
-let socket = null, begun = 0, heard = -Infinity, fresh = false, silent = live, tries = 0;
+let socket = null, begun = 0, ended = false, atMs = null, heard = -Infinity, fresh = false, silent = live, tries = 0;
 let number = Number(data.number), token = data.token, server = "", readAt = null, heardAt = null;
 
 function connect() {
@@ -23,11 +24,19 @@ function connect() {
   const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`;
   begun = now();
   tries += 1;
-  fresh = false;
+  fresh = ended = false;
   const made = new WebSocket(data.cell ? `${address}?cell=${encodeURIComponent(data.cell)}` : address);
   socket = made;
   made.onmessage = (event) => { if (made === socket) hear(JSON.parse(event.data)); };
-  if (old) { old.onmessage = null; old.close(); }
+  made.onclose = (event) => { if (made === socket) closed(event.code); };
+  if (old) { old.onmessage = old.onclose = null; old.close(); }
+}
+
+// Another person, or another pairing: what this page may do now, its server says.
+function closed(code) {
+  ended = true;
+  if (code === CHANGED) connect();
+  else if (code === REMOVED) renew();
 }
 
 function send(frame) {
@@ -47,10 +56,11 @@ function hear(frame) {
     put(frame);
     fresh = true;
   } else if (frame.t === "beat") {
+    atMs = typeof frame.at_ms === "number" ? frame.at_ms - now() : null;
     readAt = typeof frame.age_ms === "number" ? now() - frame.age_ms : null;
     if (document.visibilityState === "visible") send({t: "pong"});
   } else if (frame.t === "stopped") stopAnswered(frame);
-  else if (frame.t === "refused") note(frame.why || place("note").firstElementChild.dataset.refused);
+  else if (frame.t === "refused") note(frame.why, true);
   look();
 }
 
@@ -58,6 +68,7 @@ function hear(frame) {
 async function renew() {
   try {
     const answer = await fetch(location.href, {cache: "no-store"});
+    if (answer.redirected) location.assign(answer.url);
     const version = answer.ok && /data-version="(\w+)"/.exec(await answer.text());
     if (version && version[1] !== data.version) location.reload();
   } catch { /* the stream says that nobody is there */ }
@@ -68,6 +79,8 @@ function say(element, values) {
   for (const [name, value] of Object.entries(values)) text = text.replace(`{${name}}`, value);
   if (element.textContent !== text) element.textContent = text;
 }
+
+const isAtEnd = (main) => main.scrollTop + main.clientHeight >= main.scrollHeight - 8;
 
 function look() {
   const quiet = now() - heard;
@@ -84,14 +97,16 @@ function look() {
       say(place("lost").querySelector("[data-heard]"), {at: heardAt ? heardAt.toLocaleTimeString(document.documentElement.lang) : "?"});
       say(place("lost").querySelector("[data-tried]"), {n: tries});
     } else if (!silent) tries = 0;
-    if (quiet > ANEW_MS && now() - begun >= 1000) connect();
+    if ((quiet > ANEW_MS || ended) && now() - begun >= 1000) connect();
   }
   const age = document.querySelector("[data-age]");
   if (age && readAt !== null) say(age, {s: Math.max(0, (now() - readAt) / 1000).toFixed(1)});
   if (!asleep && now() - touched > SLEEP_MS) sleep();
   place("asleep").hidden = !asleep;
-  const main = place("main");
-  place("more").hidden = main.scrollTop + main.clientHeight >= main.scrollHeight - 8;
+  const main = place("main"), more = place("more");
+  more.hidden = main.scrollHeight <= main.clientHeight + (more.hidden ? 8 : 0);
+  const text = isAtEnd(main) ? more.dataset.up : more.dataset.down;
+  if (more.textContent !== text) more.textContent = text;
 }
 
 // Parts come whole. What was typed for this question stays; a word half composed is not torn.
@@ -157,7 +172,7 @@ function down(event) {
   stayAwake();
   if (press || held) { drop(); return; } // a second finger
   const over = event.target.closest(".over");
-  if (over) { if (over.id !== "lost") over.hidden = true; return; }
+  if (over && !event.target.closest("a")) { if (over.id !== "lost") over.hidden = true; return; }
   const button = event.target.closest(PRESSED);
   if (!button || isOff(button) || event.button !== 0) return;
   press = pressOf(button, event.pointerId);
@@ -188,7 +203,10 @@ function drop() {
 
 function act(done) {
   const {what, href} = done;
-  if (done.id === "more") place("main").scrollBy({top: place("main").clientHeight * 0.8});
+  if (done.id === "more") {
+    const main = place("main");
+    main.scrollTo({top: isAtEnd(main) ? 0 : main.scrollTop + 0.8 * main.clientHeight});
+  }
   else if (href) location.assign(href);
   else if (what.key) { if (done.number === number) type(what.key); }
   else if (what.pick) pick(done);
@@ -223,20 +241,22 @@ async function post({what, form}) {
     said = await answer.json().catch(() => ({}));
   } catch { unheard(); return; }
   if (!answer.ok) {
-    note(said.why || place("note").firstElementChild.dataset.refused);
+    note(said.why, answer.status === 403 && !form);
     if (form) for (const input of form.querySelectorAll("[type=password]")) input.value = "";
   } else if (form && form.dataset.onward) location.assign(form.dataset.onward);
   else if (what.then === "reload") location.reload();
 }
 
 let closing = 0;
-function note(text) {
-  place("note").querySelector("[data-why]").textContent = text;
+function note(why, signs) {
+  const said = place("note").querySelector("[data-why]");
+  said.textContent = why || said.dataset.refused;
+  place("note").querySelector("a").hidden = !signs;
   place("note").hidden = false;
   clearTimeout(closing);
   closing = setTimeout(() => { place("note").hidden = true; }, 6000);
 }
-const unheard = () => note(place("note").firstElementChild.dataset.unheard);
+const unheard = () => note(place("note").querySelector("[data-why]").dataset.unheard, false);
 
 // A held key: beats while this finger is surely there. What ended once never begins again.
 function hold() {
@@ -262,13 +282,14 @@ function release() {
 let latest = null;
 function stop() {
   const one = {press: identity(), begun: now(), done: false};
+  const at = atMs === null ? {} : {at_ms: Math.round(atMs + one.begun)}; // the press, by the clock of the server
   latest = one;
   place("stopped").hidden = true;
   place("stop").classList.add("down");
   const tell = () => {
     const age_ms = Math.round(now() - one.begun);
-    send({t: "stop", press: one.press, age_ms});
-    ask(data.cell ? "/stop" : "/stop-all", {...(data.cell ? {cell: data.cell} : {}), press: one.press, age_ms})
+    send({t: "stop", press: one.press, age_ms, ...at});
+    ask(data.cell ? "/stop" : "/stop-all", {...(data.cell ? {cell: data.cell} : {}), press: one.press, age_ms, ...at})
       .then(async (answer) => stopAnswered({press: one.press, outcome: answer.ok ? "" : "failed", ...await answer.json()}))
       .catch(() => {});
   };

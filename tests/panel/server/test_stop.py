@@ -190,11 +190,12 @@ def test_one_cells_press_is_no_press_of_another_cell():
 # The process that carries them out, on a simulated controller.
 
 
-@pytest.fixture
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path / "state"
+@pytest.fixture(scope="module")
+def state_folder(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("state")
+        patch.setenv("ROBOLINK_STATE_DIR", str(folder))
+        yield folder
 
 
 @pytest.fixture
@@ -211,10 +212,10 @@ def stopped(carry_out, url, language="en"):
     return asyncio.run(work())
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def own(state_folder):
-    """A process with the state folder of this test."""
     with StopProcess() as carry_out:
+        assert carry_out.ready.wait(30)
         yield carry_out
 
 
@@ -259,8 +260,8 @@ def test_a_stop_goes_out_though_the_process_hangs_or_is_killed(robot, own):
     before = own.pid
     os.kill(before, signal.SIGKILL)
     assert stopped(own, url).outcome is StopEnd.STOPPED
-    until_s = time.monotonic() + 10
-    while own.pid in (None, before) and time.monotonic() < until_s:
+    until_s = time.monotonic() + 30
+    while (own.pid in (None, before) or not own.ready.is_set()) and time.monotonic() < until_s:
         time.sleep(0.02)
     assert own.pid not in (None, before), "it was not started anew"
     assert stopped(own, url).outcome is StopEnd.STOPPED

@@ -1,6 +1,8 @@
 """Views made by hand: one of each screen and in each language, full enough to show what crowds."""
 
-from dataclasses import replace
+import json
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
 
 from markupsafe import Markup
 from robolink_cli.panel.cards import CellCard, ChangeRow, ChartCard, JobOffer
@@ -31,6 +33,8 @@ from robolink_cli.wizard.views.records import (
     Weight,
 )
 
+WORDS = json.loads(Path(__file__).with_name("chinese.json").read_text(encoding="utf-8"))
+
 MAIN, LEAVES = Weight.MAIN, Weight.LEAVES
 
 _ARROWS = (
@@ -51,7 +55,8 @@ def pad(size=0.1, why_not=""):
 
 def views(language):
     """Return one view of each screen, by name."""
-    return _chinese() if language == "zh" else _english()
+    made = _english()
+    return {name: _chinese(view) for name, view in made.items()} if language == "zh" else made
 
 
 def _view(head, body, actions, *, number=7, state="READY", halted=False, heard=(), message=""):
@@ -116,7 +121,8 @@ def _english():
                     ),
                     CheckRow("to do", "TO DO", "The motors are off", "motors", "Motors on"),
                 ),
-                "The robot will move by itself 9 times: power LOW, up to 20 mm/s, at most 60 mm from here.",
+                "The robot will move by itself 9 times: power LOW, "
+                "up to 20 mm/s, at most 60 mm from here.",
                 2,
             ),
             [
@@ -219,7 +225,8 @@ def _english():
                     ),
                 ),
                 (
-                    "14 taught points use tool 1. Programs will run up to 0.398 mm differently there (most at P12). This corrects the present error.",
+                    "14 taught points use tool 1. Programs will run up to "
+                    "0.398 mm differently there (most at P12). This corrects the present error.",
                 ),
                 "To write, type the tool number",
             ),
@@ -314,180 +321,19 @@ def _english():
     }
 
 
-def _chinese():
-    texts = {
-        "choice": ("选择", "更换胶针"),
-        "check": ("检查", ""),
-        "moving": ("移动中", ""),
-        "wait": ("请稍候", ""),
-        "touch": ("第 1 次触碰，共 2 次", ""),
-        "fit": ("一致性", ""),  # noqa: RUF001
-        "values": ("新值", ""),
-        "question": ("胶针", ""),
-        "question-yes": ("新值", ""),
-        "turn": ("旋转测试", ""),
-        "end": ("完成", ""),
-        "stopped": ("已停止", ""),
-    }
-    labels = {
-        "End the job": "结束任务",
-        "Start moving (2 open)": "开始移动(还有 2 项)",
-        "Touch 1 again": "重做第 1 次触碰",
-        "Record this touch": "记录这次触碰",
-        "Show the result": "显示结果",
-        "One more touch": "再触碰一次",
-        "Touch 4 again": "重做第 4 次触碰",
-        "Do not write": "不写入",
-        "Write": "写入",
-        "Next": "下一步",
-        "No": "否",
-        "Yes": "是",
-        "Stop: restore the old value": "停止：恢复旧值",
-        "Record": "记录",  # noqa: RUF001
-        "Report": "报告",
-        "Next tool": "下一个工具",
-        "Finish": "完成",
-        "Leave": "离开",
-        "Start again": "重新开始",
-        "\u4e2d\u6587": "English",
-        "Confirm every row first: 2 are open.": "请先确认每一项：还有 2 项。",  # noqa: RUF001
-        "Last step 0.5 mm. Finish with a step of 0.10 mm or less.": "上一步为 0.5 mm，请以 0.10 mm 或更小的步距结束。",  # noqa: RUF001
-    }
-    bodies = {
-        "choice": ChoiceView(
-            ("控制器 EPSON RC90-B，序列号 0815；当前工具 1。",),
-            "做哪项任务？",  # noqa: RUF001
-            (
-                ChoiceRow("在基准销上校准胶针 22G", "1", ("上次：11 月 26 日，陈；约 4 分钟",)),  # noqa: RUF001
-                ChoiceRow("一次触碰", "2", ("再换 3 次后需要完整校准；约 1 分钟",)),  # noqa: RUF001
-                ChoiceRow("两个吸嘴", "3", ("这里从未做过",)),
-                ChoiceRow("重新寻找基准位 PIN-07", "4", ("仅限工程师",)),
-            ),
-            0,
-            "打开",
-            "en",
-        ),
-        "check": CheckView(
-            (
-                CheckRow("ok", "正常", "控制器有应答；急停已释放，安全门已关闭"),  # noqa: RUF001
-                CheckRow("ok", "正常", "全部 15 个工具已备份：11 月 28 日 14:23"),  # noqa: RUF001
-                CheckRow("look", "注意", "工具 1 自上次报告以来变化了 0.061 mm"),
-                CheckRow("you", "请您", "新胶针已装好并拧紧；针尖和基准销干净", "clean", "确认"),  # noqa: RUF001
-                CheckRow(
-                    "you", "请您", "工作站内无人，软管不受阻碍", "clear", "撤回", confirmed=True
-                ),  # noqa: RUF001
-                CheckRow("to do", "待办", "电机已关闭", "motors", "开启电机"),
-            ),
-            "机器人将自行移动 9 次：低功率，最高 20 mm/s，距此处最多 60 mm。",
-            2,
-        ),  # noqa: RUF001
-        "moving": MovingView(
-            "移到基准销上方，比预计针尖高 2 mm",
-            "然后请把针尖移到针销上。",  # noqa: RUF001
-            ("还有 118.4 mm", "最高 20 mm/s，低功率"),  # noqa: RUF001
-            ArmPicture((240.0, 180.0), 40.0, (310.0, 290.0), (220.0, -20.0), follows=False),
-            None,
-        ),
-        "wait": WaitView(("第 5 次触碰已记录，共 5 次。", "正在抬离基准销。")),  # noqa: RUF001
-        "question": QuestionView(
-            ("胶针的编号在针座上。",), "请扫描或输入新胶针的编号。", text=True
-        ),
-        "question-yes": QuestionView(
-            ("Z 未测量。Z 保持 -20.000。",), "新胶针与旧胶针长度完全相同吗？", text=False
-        ),  # noqa: RUF001
-    }
-    made = {}
-    for name, view in _english().items():
-        title, _ = texts[name]
-        body = bodies.get(name, view.body)
-        if name == "touch":
-            body = replace(
-                body,
-                instruction=("请步进，把针尖移到基准销上。",),
-                where="法兰",  # noqa: RUF001
-                way="33.27 mm，41 步",
-                notes=("相对第 1 次触碰的高度：+0.012 mm", "接触：无传感器，用纸片或放大镜"),
-            )  # noqa: RUF001
-        if name == "turn":
-            body = replace(
-                body,
-                instruction=(
-                    "请再次把针尖移到基准销上。robolink 会测量偏差。",
-                    "允许 0.200 mm。如果偏差更大，robolink 会写回旧值。",
-                ),
-                where="法兰",
-                notes=(),  # noqa: RUF001
-                angles=tuple(replace(one, word="正常") for one in body.angles),
-            )
-        if name == "fit":
-            body = replace(
-                body,
-                told=(
-                    "重复精度 +-0.031 mm (95 %)。",
-                    "再触碰一次约为 +-0.026 mm。",
-                    "第 4 次触碰偏差 0.075 mm，远大于其他。",
-                ),
-            )  # noqa: RUF001
-        if name == "values":
-            (tool,) = body.tools
-            tool = replace(
-                tool,
-                statements=(
-                    "针尖将移动 0.398 mm。",
-                    "X、Y：重复精度 +-0.024 mm，准确度 +-0.061 mm (95 %)。",
-                ),  # noqa: RUF001
-                verdicts=(
-                    ("ok", "正常", "针尖变化：0.398 mm。允许：2.000 mm。"),  # noqa: RUF001
-                    ("look", "注意", "Z -20.000 未测量，保持不变。"),
-                ),
-            )  # noqa: RUF001
-            body = ValuesView(
-                (tool,),
-                (
-                    "14 个示教点使用工具 1。程序在这些点的位置最多变化 0.398 mm (P12 最大)。这将纠正现有误差。",
-                ),
-                "要写入，请输入工具编号",
-            )  # noqa: RUF001
-        if name == "end":
-            body = replace(
-                body,
-                headed="完成",
-                lines=(
-                    "工具 1 的胶针 N-0815 已测量、写入并测试。",
-                    "控制器中：工具 1 = X 12.327 Y -3.726 Z -20.000 U 0.000",  # noqa: RUF001
-                    "X、Y：重复精度 +-0.024 mm，准确度 +-0.061 mm (95 %)。",
-                    "请慢速运行第一个工件并观察。",
-                ),  # noqa: RUF001
-                angles=tuple(replace(one, word="正常") for one in body.angles),
-            )
-        if name == "stopped":
-            body = replace(
-                body,
-                headed="已停止",
-                lines=(
-                    "在此结束：第 2 次触碰，共 2 次。",
-                    "有人在面板上按了停止(王，平板 2)。",  # noqa: RUF001
-                    "机器人已停止(已确认)。未写入；工具 1 保持原样。",
-                    "下一步：robolink recover",
-                ),
-            )  # noqa: RUF001
-        made[name] = replace(
-            view,
-            head=replace(view.head, job="更换胶针", title=title),
-            body=body,
-            status=replace(view.status, state="就绪"),
-            actions=tuple(
-                replace(
-                    one,
-                    label=labels.get(one.label, one.label),
-                    why_not=labels.get(one.why_not, one.why_not),
-                )
-                for one in view.actions
-            ),
-            message="已记录。下一个角度：U 120。" if view.message else "",  # noqa: RUF001
-            heard=("旧胶针为 N-0790。",) if view.heard else (),
+def _chinese(said):
+    """Return the same in Chinese: every text of a record, looked up in ``chinese.json``."""
+    if isinstance(said, Weight):
+        return said
+    if isinstance(said, str):
+        return WORDS.get(said, said)
+    if isinstance(said, tuple):
+        return tuple(map(_chinese, said))
+    if is_dataclass(said):
+        return replace(
+            said, **{one.name: _chinese(getattr(said, one.name)) for one in fields(said)}
         )
-    return made
+    return said
 
 
 JOBS = (

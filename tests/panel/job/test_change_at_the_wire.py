@@ -47,4 +47,8 @@ def test_a_whole_change_is_carried_out_and_proved(cell):
     after, tip = simulator.machine.tools.get(1), simulator.world.tips[1]
     assert abs(after.x_mm - before.x_mm) + abs(after.y_mm - before.y_mm) > 0.2
     assert abs(after.x_mm - tip.x_mm) < 0.1 > abs(after.y_mm - tip.y_mm)
-    assert all(one.number == 0 for one in tablet.views if not one.waits and one.body.__class__.__name__ == "MovingView")
+    assert all(
+        one.number == 0
+        for one in tablet.views
+        if not one.waits and one.body.__class__.__name__ == "MovingView"
+    )

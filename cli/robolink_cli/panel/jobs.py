@@ -147,7 +147,7 @@ class Job:
             its.set_inheritable(True)
             self._process = await asyncio.create_subprocess_exec(
                 sys.executable,
-                *("-m", "robolink_cli.panel.job", str(its.fileno()), *self.arguments),
+                *("-m", "robolink_cli.job_process", str(its.fileno()), *self.arguments),
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.DEVNULL,
                 stderr=asyncio.subprocess.PIPE,

@@ -1,7 +1,7 @@
 """Whether a person can be asked, and where: the entry of the process answers it once.
 
 A person is at the terminal of this process, or at the other end of a wire: a page on a tablet,
-whose server started this process (:mod:`robolink_cli.panel.job`).
+whose server started this process (:mod:`robolink_cli.job_process`).
 """
 
 import os

@@ -1,6 +1,6 @@
 """The entry of a job's process: one command line, shown to whoever is at the other end of a wire.
 
-``python -m robolink_cli.panel.job FD ARGUMENT...`` does what ``robolink ARGUMENT...`` does. FD is
+``python -m robolink_cli.job_process FD ARGUMENT...`` does what ``robolink ARGUMENT...`` does. FD is
 an inherited stream socket, on which views go out and presses come in, as lines of JSON. This
 process has the controller; whoever started it has none.
 """
@@ -19,7 +19,7 @@ def main() -> NoReturn:
         os.set_inheritable(descriptor, False)  # what this process starts is no end of the wire
         wire = socket.socket(fileno=descriptor)
     except (IndexError, ValueError, OSError) as error:
-        sys.exit(f"python -m robolink_cli.panel.job FD ARGUMENT...: no wire ({error})")
+        sys.exit(f"python -m robolink_cli.job_process FD ARGUMENT...: no wire ({error})")
     sys.exit(run(wire, sys.argv[2:], last=True))
 
 

@@ -7,7 +7,6 @@ import threading
 import time
 from contextlib import suppress
 
-from robolink_cli import job_process
 from robolink_cli.wizard.views.records import (
     CheckView,
     ChoiceView,

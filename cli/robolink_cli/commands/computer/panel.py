@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.model import Secret
 from robolink_cli.commands.simulate.service import host_and_port
 from robolink_cli.console.language import language_now
@@ -30,7 +31,13 @@ NEEDED: Final = ("starlette", "uvicorn", "websockets")
 """Packages of the extra, without which no page is served."""
 
 
-SUBCOMMANDS: Final[dict[str, tuple[str, str]]] = {}
+_ACCESS: Final = "robolink_cli.commands.computer.panel_access"
+
+SUBCOMMANDS: Final = {
+    "pin": (f"{_ACCESS}:pin", declared("Set the PIN of a person, or of this computer.")),
+    "tablets": (f"{_ACCESS}:tablets", declared("List the paired tablets; forget one.")),
+    "cert": (f"{_ACCESS}:cert", declared("Make a certificate, for tablets on the network.")),
+}
 """What else there is about the panel, as :class:`~robolink_cli.lazy_group.LazyGroup` takes it."""
 
 
@@ -88,10 +95,14 @@ def panel(
             cells, told = _demo(stack)
         if cells is not None:
             os.environ["ROBOLINK_CONFIG"] = str(cells.absolute())
-        place = _place(host, port, certificate, key)
-        served = _served(cells)
+        place, names = _place(host, port, certificate, key)
+        served = _served(cells, names)
+        from robolink_cli.panel.guard.audit import Audit
         from robolink_cli.panel.serving import run
 
+        audit = Audit({cell.name: cell.url for cell in served.cells})
+        stack.callback(audit.close)
+        served = replace(served, audit=audit)
         run(served, place, lambda url: _announce(url, served, told))
 
 
@@ -137,26 +148,36 @@ def _drawn_pin() -> str:
     return f"{secrets.randbelow(9) + 1}{secrets.randbelow(10**6):06}2"
 
 
-def _place(host: str, port: int, certificate: Path | None, key: Path | None) -> "Place":
-    """Return where the panel is served.
+def _place(
+    host: str, port: int, certificate: Path | None, key: Path | None
+) -> "tuple[Place, tuple[str, ...]]":
+    """Return where the panel is served, and the names of its certificate.
 
     Raises:
-        ConfigError: Other computers could reach it, and there is no TLS.
+        ConfigError: Other computers could reach it, and there is no TLS; or the certificate cannot
+            be used.
     """
     from robolink_cli.panel.guard.access import is_loopback
     from robolink_cli.panel.serving import Place
 
     if (certificate is None) != (key is None):
         raise click.UsageError(tr("--tls-cert and --tls-key go together."))
-    if certificate is None and not is_loopback(host):
+    if certificate is None and is_loopback(host):
+        return Place(host, port), ()
+    require_packages(("cryptography",))
+    from robolink_cli.panel.guard import tls
+
+    path, own_key = (certificate, key) if certificate and key else tls.own_files()
+    if certificate is None and not path.exists():
         raise ConfigError(
             tr("Other computers can reach {host}, so the panel needs TLS there.", host=host),
-            remedy=tr("Give --tls-cert and --tls-key."),
+            remedy=tr("Run 'robolink panel cert', or give --tls-cert and --tls-key."),
         )
-    return Place(host, port, str(certificate or ""), str(key or ""))
+    found = tls.load(path, own_key)
+    return Place(host, port, str(found.path), str(found.key)), found.names
 
 
-def _served(cells_file: Path | None) -> "Served":
+def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
     """Return what the panel shows, and to whom.
 
     Raises:
@@ -185,6 +206,7 @@ def _served(cells_file: Path | None) -> "Served":
     return Served(
         tuple(_shown(cell) for cell in found.values()),
         {name: cell.settings.people for name, cell in found.items()},
+        names,
         language=language_now(),
     )
 

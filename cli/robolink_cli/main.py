@@ -24,11 +24,11 @@ from robolink_cli.console.output import (
     tolerate_any_console,
     watched_output,
 )
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
 from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.lazy_group import FrontPage
 from robolink_cli.options.shared import TYPED, all_shared
-from robolink_cli.prompts.person import Person, person_here
 
 if TYPE_CHECKING:
     from robolink_cli.stopping.request import StopRequest

@@ -21,7 +21,7 @@ from robolink.locale.languages import (
     translator,
 )
 from robolink.messages import install, spoken, tr
-from robolink_cli.prompts.person import Person, person_here
+from robolink_cli.console.person import Person, person_here
 
 OPTION: Final = "--lang"
 VARIABLE: Final = "ROBOLINK_LANG"

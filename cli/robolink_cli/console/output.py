@@ -22,8 +22,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Final, TextIO
 
 from robolink.interrupts import Interrupted, output_closed
+from robolink_cli.console.person import Person, is_terminal, person_here
 from robolink_cli.console.tables import filled, within
-from robolink_cli.prompts.person import Person, is_terminal, person_here
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer

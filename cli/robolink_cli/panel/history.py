@@ -19,7 +19,6 @@ from robolink.timing import local_label, wall_time
 from robolink.transaction import id_of_change
 from robolink.transport import parse_url
 from robolink_cli.access.change_page import reports_from
-from robolink_cli.commands.record.journal_lookup import entries_of_change
 from robolink_cli.panel.cards import ChangeRow, ChartCard
 from robolink_cli.views.journal import who
 
@@ -88,7 +87,13 @@ def page_of(url: str, change: str) -> str:
         JournalError: The journal cannot be read.
     """
     journal = open_journal(read_only=True)
-    entries = entries_of_change(journal, change, controller=parse_url(url).address)
+    address = parse_url(url).address
+    entries = [*journal.entries(controller=address, change=change, newest_first=False)]
+    if not entries:
+        raise ConfigError(
+            tr("This cell has no change {name!r} on record.", name=change),
+            remedy=tr("Open the history of the cell and choose a change there."),
+        )
     reports, _ = reports_from(journal, entries)
     return render(*reports)
 

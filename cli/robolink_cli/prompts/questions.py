@@ -14,9 +14,9 @@ import click
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.declaration import CliOption
-from robolink_cli.prompts.person import person_here
 
 if TYPE_CHECKING:
     from robolink.model import AnsweredBy, Controller, Jump

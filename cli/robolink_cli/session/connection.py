@@ -16,8 +16,8 @@ from robolink_cli.access.cell import acceleration_of, require_expected_robot
 from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on, note
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import WATCHED, asked
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import CELL, REACHED

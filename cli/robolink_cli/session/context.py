@@ -19,11 +19,11 @@ from robolink_cli.access.cell import (
     only_cell,
     which_cell,
 )
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.console.render import json_is_on, log_wanted, note
 from robolink_cli.options.declaration import add_declared, packed
 from robolink_cli.options.shared import GIVEN, TYPED, all_shared
 from robolink_cli.prompts.current_desk import current_desk
-from robolink_cli.prompts.person import Person, person_here
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import click
 from robolink.errors import DeclinedError, JournalError
 from robolink.messages import tr
 from robolink.model import EntryKind
+from robolink_cli.console.person import person_here
 from robolink_cli.prompts import questions
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import WATCHED
 from robolink_cli.stopping.notes import heed_stop
 

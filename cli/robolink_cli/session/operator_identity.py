@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import LINE
-from robolink_cli.prompts.person import person_here
 
 if TYPE_CHECKING:
     from robolink.config import Expected

@@ -7,8 +7,8 @@ from robolink.messages import tr
 from robolink.model import is_own_name
 from robolink.stopping import StopNote, clear_note, find_note
 from robolink.transport import far_end_of
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import note
-from robolink_cli.prompts.person import person_here
 
 if TYPE_CHECKING:
     from robolink.model import Controller

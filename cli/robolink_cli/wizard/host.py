@@ -12,9 +12,9 @@ import click
 
 from robolink.errors import RobolinkError
 from robolink_cli.console.output import PLAIN, shown_by
+from robolink_cli.console.person import Person, person_at
 from robolink_cli.console.render import note
 from robolink_cli.prompts.current_desk import current_desk, sitting_at
-from robolink_cli.prompts.person import Person, person_at
 from robolink_cli.wizard.ending import ended_of, kept_lines
 from robolink_cli.wizard.happenings import OffersAtTheEnd, WizardCommand
 from robolink_cli.wizard.state import Header, WizardState

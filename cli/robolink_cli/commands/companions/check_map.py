@@ -26,9 +26,9 @@ from robolink.register_maps import (
     values_of,
 )
 from robolink.timing import local_label
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on, note, say, table
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.prompts.person import person_here
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
 

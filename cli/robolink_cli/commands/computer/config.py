@@ -9,10 +9,10 @@ import click
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, emit_json, json_is_on, note, say
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import asked_for_text
 from robolink_cli.session.context import CliContext, optional_controller
 

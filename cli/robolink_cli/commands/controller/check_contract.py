@@ -241,8 +241,8 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
         DeclinedError: No, or nobody could be asked.
         NotReadyError: Nothing can move now.
     """
+    from robolink_cli.console.person import person_here
     from robolink_cli.prompts import questions
-    from robolink_cli.prompts.person import person_here
     from robolink_cli.session.motion_consent import (
         agree_to_motion,
         heed_what_was_left,

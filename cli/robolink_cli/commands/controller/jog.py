@@ -10,10 +10,10 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, show_requests
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.prompts.person import person_here
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options, guided_if_alone
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question

@@ -9,12 +9,12 @@ from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.access.warnings import note_unsettled
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, note, say, show_requests
 from robolink_cli.console.shell_words import state_word
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import shared_options
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (

@@ -153,8 +153,8 @@ def recalibrate(
     """
     from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
     from robolink_cli.commands.measure.recipe_choice import nobody_to_ask
+    from robolink_cli.console.person import person_here
     from robolink_cli.console.render import note
-    from robolink_cli.prompts.person import person_here
     from robolink_cli.session.context import guided_if_alone
 
     if recipe is None and not person_here():

@@ -21,10 +21,10 @@ from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.console.exit_codes import error_body, exit_code
 from robolink_cli.console.output import drawn_elsewhere, hand_over
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, note, say, switch_json_on
 from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import asked, keep_answer
 from robolink_cli.session.check_before_start import check_before_start, name_the_needle
 from robolink_cli.session.connection import open_controller

@@ -11,11 +11,11 @@ from robolink.timing import local_label
 from robolink.transaction import Recovery, look
 from robolink_cli.commands.measure.recipe_choice import context_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.prompts.current_desk import current_desk
-from robolink_cli.prompts.person import person_here
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (
     CliContext,

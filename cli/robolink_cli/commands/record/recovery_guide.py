@@ -10,9 +10,9 @@ from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Pose, be
 from robolink.stations import StationKind
 from robolink.timing import local_label
 from robolink.transaction import Recovery, Settler, look, recover
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on, note, say
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import agree, asked, keep_answer
 from robolink_cli.session.check_before_start import agree_to_procedure
 from robolink_cli.views.documents import finding_payload, pose_payload

@@ -10,10 +10,10 @@ from robolink.messages import tr
 from robolink.model import Controller
 from robolink.transaction import Undone, UndoPlan
 from robolink.transaction import undo as take_back
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on, note, say, show_requests
 from robolink_cli.options.consent import DryRun, ThenSelect, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.connection import open_controller

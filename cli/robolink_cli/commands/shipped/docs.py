@@ -10,11 +10,11 @@ from typing import Annotated, Final
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.person import is_terminal
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.console.tables import filled, has_wide, within
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.prompts.person import is_terminal
 
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
 """HTML comments, which are for authors of a page. A browser hides them too."""

@@ -25,12 +25,12 @@ from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.live import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on, note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import terminal
-from robolink_cli.prompts.person import person_here
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.order import ordered, show_done, with_order

@@ -114,7 +114,7 @@ async def serve(
             timeout_graceful_shutdown=_LAST_ANSWERS_S,
             ssl_certfile=place.certificate or None,
             ssl_keyfile=place.key or None,
-            ssl_context_factory=place.context,
+            ssl_context_factory=place.context if place.certificate else None,
             **access.server_options(),
         )
         server = _Server(config)

@@ -11,6 +11,7 @@ import time
 from importlib.resources import files
 
 import uvicorn
+from robolink_cli.panel.guard.gate import CONTENT_SECURITY
 from robolink_cli.panel.pages import HERE, Pages, Watcher
 from starlette.applications import Starlette
 from starlette.responses import HTMLResponse, JSONResponse, Response
@@ -34,6 +35,7 @@ class ScriptedPanel:
         frozen: Whether nothing is sent or answered.
         answers: What a STOP is answered with; ``None`` for nothing.
         server: The name that the server gives itself.
+        documents: Further pages, by their paths.
     """
 
     def __init__(self):
@@ -41,6 +43,7 @@ class ScriptedPanel:
         self.view, self.watcher = samples.views("en")["touch"], OPERATOR
         self.frozen, self.answers, self.server = False, "stopped", "one"
         self.age_ms = 200
+        self.documents = {}
         self.pages = Pages()
         self.port = 0
         self._sockets = set()
@@ -65,6 +68,7 @@ class ScriptedPanel:
                 Route("/cell/{cell}", self._cell),
                 Route("/static/{name}", self._static),
                 Route("/{path:path}", self._post, methods=["POST"]),
+                Route("/{path:path}", self._document),
                 WebSocketRoute("/live", self._live),
             ]
         )
@@ -108,7 +112,10 @@ class ScriptedPanel:
             "cell", self.watcher, cell=request.path_params["cell"], parts=self.parts(),
             number=self.view.number, token="T",
         )  # fmt: skip
-        return HTMLResponse(page)
+        return _page(page)
+
+    async def _document(self, request):
+        return _page(self.documents[request.url.path])
 
     async def _static(self, request):
         name = request.path_params["name"]
@@ -171,6 +178,10 @@ class ScriptedPanel:
                 await asyncio.wait_for(news.wait(), 0.2)
             except TimeoutError:
                 continue
+
+
+def _page(text):
+    return HTMLResponse(text, headers={"Content-Security-Policy": CONTENT_SECURITY})
 
 
 def until(holds, within_s=15.0):

@@ -1,4 +1,4 @@
-"""The other end of a job's wire: reads views, and presses as a page would; in a thread beside it."""
+"""The other end of a job's wire: reads views, and presses as a page would, in a thread."""
 
 import json
 import select
@@ -7,6 +7,7 @@ import threading
 import time
 from contextlib import suppress
 
+from robolink_cli import job_process
 from robolink_cli.wizard.views.records import (
     CheckView,
     ChoiceView,
@@ -107,6 +108,14 @@ class Tablet:
         self.read(0.0)
         return self.view.body
 
+    def changes(self, body):
+        """Wait until something else is shown."""
+        return self.see(lambda view: view.body != body)
+
+    def goes_on(self, number):
+        """Wait until something else is asked, or nothing."""
+        return self.see(lambda view: view.number != number)
+
     def press(self, action, value="", number=None):
         number = self.view.number if number is None else number
         self.send({"t": "press", "number": number, "action": action, "value": value})
@@ -178,7 +187,7 @@ def change(tablet, eyes, needle="N-0418"):
                 todo = [row for row in rows if row.mark in ("you", "to do") and not row.confirmed]
                 if left:
                     tablet.press("confirm", todo[0].name)
-                    tablet.see(lambda view: view.body != body)
+                    tablet.changes(body)
                     continue
                 tablet.press("start")
             case TouchView():
@@ -197,7 +206,7 @@ def change(tablet, eyes, needle="N-0418"):
                 tablet.press("choose", rows[0].value)
             case EndView():
                 return body
-        tablet.see(lambda view: view.number != number)
+        tablet.goes_on(number)
 
 
 def at_the_wire(arguments, script, *, lives=True):
@@ -221,7 +230,7 @@ def at_the_wire(arguments, script, *, lives=True):
 
     thread = threading.Thread(target=play, daemon=True)
     thread.start()
-    code = job.run(theirs, arguments)
+    code = job_process.run(theirs, arguments)
     thread.join(30.0)
     if failed:
         raise failed[0]

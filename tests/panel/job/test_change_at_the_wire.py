@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_cli.wizard.views.records import EndView
+from robolink_cli.wizard.views.records import EndView, MovingView
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.control.assist import InProcessEyes, serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
@@ -42,13 +42,12 @@ def test_a_whole_change_is_carried_out_and_proved(cell):
     code, tablet = at_the_wire(["-c", url, "change", str(RECIPE)], script)
     (end,) = ended
     assert (code, tablet.left["code"]) == (0, 0)
-    assert isinstance(end, EndView) and end.done
+    assert isinstance(end, EndView)
+    assert end.done
     assert end.after_mm < 0.1 < end.before_mm
     after, tip = simulator.machine.tools.get(1), simulator.world.tips[1]
     assert abs(after.x_mm - before.x_mm) + abs(after.y_mm - before.y_mm) > 0.2
     assert abs(after.x_mm - tip.x_mm) < 0.1 > abs(after.y_mm - tip.y_mm)
-    assert all(
-        one.number == 0
-        for one in tablet.views
-        if not one.waits and one.body.__class__.__name__ == "MovingView"
-    )
+    moving = [one for one in tablet.views if isinstance(one.body, MovingView)]
+    assert moving
+    assert {one.number for one in moving} == {0}

@@ -88,7 +88,6 @@ function look() {
     silent = quiet > GREY_MS || !fresh;
     if (silent && held) release();
     page.classList.toggle("silent", silent);
-    for (const id of ["main", "foot"]) place(id).inert = silent;
     const lost = silent && (heardAt !== null ? quiet > GREY_MS : now() > ANEW_MS);
     place("lost").hidden = !lost;
     if (lost) {

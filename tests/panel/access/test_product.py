@@ -5,6 +5,7 @@ import json
 import random
 import threading
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -41,6 +42,7 @@ class Product:
 
     def __init__(self):
         self.kept, self.begun = [], []
+        self.trusts = None
 
     def note(self, kind, cell, **facts):
         self.kept.append((kind, cell, facts))
@@ -49,8 +51,9 @@ class Product:
         return Browser(self, **options)
 
     @contextmanager
-    def served(self, place=None):
-        ready, loop_of = threading.Event(), []
+    def served(self, place=None, names=()):
+        ready = threading.Event()
+        loop_of: list[Any] = []
 
         async def run():
             ended = asyncio.Event()
@@ -61,7 +64,7 @@ class Product:
                 ready.set()
 
             cells = tuple(PanelCell(name, URL) for name in PEOPLE)
-            served = Served(cells, PEOPLE, audit=self)
+            served = Served(cells, PEOPLE, names, audit=self)
             await serve(served, place or Place("127.0.0.1", 0), ready=told, ended=ended)
 
         thread = threading.Thread(target=lambda: asyncio.run(run()))
@@ -122,7 +125,7 @@ def page(product, who=MEI, cell=CELL):
 
 def test_each_address_of_the_panel_stands_in_the_table_of_the_gate():
     found = Application.application(object.__new__(_Routes))
-    gets, posts, streams = set(), set(), set()
+    gets, posts, streams = set[str](), set[str](), set[str]()
     for route in found.routes:
         if isinstance(route, WebSocketRoute):
             streams.add(route.path)
@@ -188,9 +191,17 @@ def test_no_job_is_a_raw_statement_a_typed_value_or_a_yes_in_advance():
         assert not words & {"--speed", "--power", "--password-file", "--record"}, kind.name
 
 
-NO_JOBS = ["execute-raw", "tool", "reset", "robot", "journal", "expert", "sim", "--yes", "-c"]
-NO_JOBS += ["CHANGE", "solve", "jog", "panel"]
-NO_JOBS += ["tool set", "cell new", "panel pin", "change --yes", "", " change", None, 1, ["change"]]
+NO_JOBS: list[object] = [
+    *["execute-raw", "tool", "reset", "robot", "journal", "expert", "sim", "--yes", "-c"]
+]
+NO_JOBS += [
+    *["CHANGE", "solve", "jog", "panel"],
+    "tool set",
+    "cell new",
+    "panel pin",
+    "change --yes",
+]
+NO_JOBS += ["", " change", None, 1, ["change"]]
 
 
 def test_what_is_no_job_does_not_begin(product):

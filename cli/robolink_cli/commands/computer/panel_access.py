@@ -13,10 +13,10 @@ from robolink.messages import known_names, tr
 from robolink.model import Secret
 from robolink.timing import local_label
 from robolink_cli.commands.computer.panel import require_packages
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.console.render import emit, json_is_on, say
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.prompts.person import Person, person_here
 
 _MOST_BYTES = 1000
 

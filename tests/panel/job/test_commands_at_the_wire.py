@@ -8,14 +8,16 @@ from robolink_cli.wizard.views.records import (
     CheckView,
     ChoiceView,
     EndView,
+    FitView,
     QuestionView,
     TouchView,
+    ValuesView,
 )
 from robolink_simulators.control.assist import InProcessEyes
 
 from tests.panel.job._tablet import Hand, at_the_wire, to_the_jog
 
-BODIES = (ChoiceView, CheckView, TouchView, QuestionView, EndView)
+BODIES = (ChoiceView, CheckView, TouchView, QuestionView, FitView, ValuesView, EndView)
 
 
 def lines_of(body):
@@ -50,6 +52,10 @@ def through(arguments, *, answers=None, eyes=None):
                         tablet.changes(body)
                         continue
                     tablet.press("start")
+                case ValuesView(tools=tools):
+                    tablet.press("write", "".join(str(one.tool) for one in tools))
+                case FitView():
+                    tablet.press("go_on")
                 case QuestionView(text=True):
                     tablet.press("answer", "anna")
                 case QuestionView():
@@ -113,15 +119,35 @@ def test_a_jog_by_hand_ends_with_where_it_is(robot):
     assert "X " in lines_of(end)
 
 
-def test_a_station_is_learnt_and_a_tool_calibrated_at_the_wire(robot):
+def test_a_station_is_learnt_by_hand_at_the_wire(robot):
+    simulator, _, url = robot
+    words = ["cell", "station", "learn", "PIN-09", "--tool", "1"]
+    code, end, seen = through(["-c", url, *words], eyes=InProcessEyes(simulator))
+    assert sum(isinstance(one, TouchView) for one in seen) >= 2
+    assert (code, end.done) == (0, True), end
+    assert "PIN-09" in lines_of(end)
+    assert main.run(["-c", url, "cell", "station", "show", "PIN-09"]) == 0
+
+
+def test_a_tool_is_calibrated_by_hand_at_the_wire(robot):
     simulator, _, url = robot
     tip = simulator.world.tips[1]
     simulator.world.tips[1] = replace(tip, x_mm=tip.x_mm + 0.31, y_mm=tip.y_mm - 0.22)
-    eyes = InProcessEyes(simulator)
-    words = ["calibrate", "two-pose", "--tool", "1", "--dry-run"]
-    code, end, _ = through(["-c", url, *words], eyes=eyes)
-    assert (code, end.done) == (0, True)
-    assert lines_of(end)
+    words = ["calibrate", "two-pose", "--tool", "1"]
+    code, end, seen = through(["-c", url, *words], eyes=InProcessEyes(simulator))
+    assert (code, end.done) == (0, True), end
+    assert any(isinstance(one, ValuesView) for one in seen)
+    assert "Tool 1" in lines_of(end)
+
+
+def test_a_check_of_a_cell_tells_its_findings(robot, tmp_path, monkeypatch):
+    _, _, url = robot
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robolink.toml").write_text(f'[cells.line3]\nurl = "{url}"\n')
+    code, end, _ = through(["-c", "line3", "cell", "check"])
+    assert code in (0, 1)
+    assert end.done
+    assert "line3" in lines_of(end)
 
 
 def test_nothing_more_is_asked_of_a_command_that_only_looks(robot):

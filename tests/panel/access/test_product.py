@@ -5,6 +5,7 @@ import json
 import random
 import threading
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -16,6 +17,8 @@ from robolink_cli.panel.guard.people import Pins
 from robolink_cli.panel.hub import Hub, PanelCell
 from robolink_cli.panel.jobs import KINDS, Job, options_of
 from robolink_cli.panel.serving import Place, Served, serve
+from robolink_cli.panel.watch import CellWatch
+from robolink_cli.wizard.views.wire import from_wire
 from starlette.routing import Route, WebSocketRoute
 
 from robolink.model import PersonRole, Secret
@@ -35,11 +38,46 @@ GETS = {
 }
 
 
+VIEW = {
+    "number": 7,
+    "waits": True,
+    "head": {
+        "cell": CELL,
+        "job": "undo",
+        "title": "Ready?",
+        "step": None,
+        "simulated": True,
+        "needle": "",
+    },
+    "status": None,
+    "body": {"kind": "question", "told": [], "question": "Ready?", "text": False},
+    "actions": [],
+    "heard": [],
+    "message": "",
+}
+
+
+class RunningJob(Job):
+    """A job without a process, which keeps what it is told."""
+
+    def __init__(self, *given, **named):
+        super().__init__(*given, **named)
+        self.heard = []
+
+    def _send(self, said, *, may_be_lost=False):
+        if said["t"] != "alive":
+            self.heard.append(said)
+
+
 class Product:
     """The panel, served; with the notes and the begun jobs of a test."""
 
     def __init__(self):
         self.kept, self.begun = [], []
+        self.trusts = None
+        self.runs: Any = False
+        """Whether what is begun runs; then the job that runs."""
+        self.hub: Any = None
 
     def note(self, kind, cell, **facts):
         self.kept.append((kind, cell, facts))
@@ -47,9 +85,13 @@ class Product:
     def browser(self, **options):
         return Browser(self, **options)
 
+    def board(self, cell):
+        return self.hub.boards[cell]
+
     @contextmanager
-    def served(self, place=None):
-        ready, loop_of = threading.Event(), []
+    def served(self, place=None, names=()):
+        ready = threading.Event()
+        loop_of: list[Any] = []
 
         async def run():
             ended = asyncio.Event()
@@ -60,7 +102,7 @@ class Product:
                 ready.set()
 
             cells = tuple(PanelCell(name, URL) for name in PEOPLE)
-            served = Served(cells, PEOPLE, audit=self)
+            served = Served(cells, PEOPLE, names, audit=self)
             await serve(served, place or Place("127.0.0.1", 0), ready=told, ended=ended)
 
         thread = threading.Thread(target=lambda: asyncio.run(run()))
@@ -88,8 +130,23 @@ def served(tmp_path_factory):
 
         async def begin(_self, board, kind, **given):
             product.begun.append((board.name, kind.name, given))
+            if product.runs:
+                job = RunningJob(board.name, kind, changed=board.renew, **given)
+                job.view = from_wire(VIEW)
+                board.job = product.runs = job
 
+        async def looks_at_nothing(_self):
+            pass
+
+        made = Hub.__init__
+
+        def kept(hub, *given, **named):
+            made(hub, *given, **named)
+            product.hub = hub
+
+        patch.setattr(Hub, "__init__", kept)
         patch.setattr(Hub, "begin", begin)
+        patch.setattr(CellWatch, "take", looks_at_nothing)
         for name, pin in PINS.items():
             Pins().set(name, Secret(pin))
         with product.served():
@@ -117,7 +174,7 @@ def page(product, who=MEI, cell=CELL):
 
 def test_each_address_of_the_panel_stands_in_the_table_of_the_gate():
     found = Application.application(object.__new__(_Routes))
-    gets, posts, streams = set(), set(), set()
+    gets, posts, streams = set[str](), set[str](), set[str]()
     for route in found.routes:
         if isinstance(route, WebSocketRoute):
             streams.add(route.path)
@@ -183,15 +240,23 @@ def test_no_job_is_a_raw_statement_a_typed_value_or_a_yes_in_advance():
         assert not words & {"--speed", "--power", "--password-file", "--record"}, kind.name
 
 
-NO_JOBS = ["execute-raw", "tool", "reset", "robot", "journal", "expert", "sim", "--yes", "-c"]
-NO_JOBS += ["CHANGE", "solve", "jog", "panel"]
-NO_JOBS += ["tool set", "cell new", "panel pin", "change --yes", "", " change", None, 1, ["change"]]
+NO_JOBS: list[object] = [
+    *["execute-raw", "tool", "reset", "robot", "journal", "expert", "sim", "--yes", "-c"]
+]
+NO_JOBS += [
+    *["CHANGE", "solve", "jog", "panel"],
+    "tool set",
+    "cell new",
+    "panel pin",
+    "change --yes",
+]
+NO_JOBS += ["", " change", None, 1, ["change"]]
 
 
-@pytest.mark.parametrize("job", NO_JOBS)
-def test_what_is_no_job_does_not_begin(product, job):
+def test_what_is_no_job_does_not_begin(product):
     browser = page(product)
-    assert browser.post("/start", {"cell": CELL, "job": job}).status == 404
+    for job in NO_JOBS:
+        assert browser.post("/start", {"cell": CELL, "job": job}).status == 404, job
     assert product.begun == []
 
 
@@ -223,7 +288,7 @@ TEXTS = st.one_of(
 )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.dictionaries(st.text(max_size=20), TEXTS, max_size=5), st.sampled_from(sorted(KINDS)))
 def test_no_value_of_a_page_becomes_an_option_of_a_command(values, name):
     kind = KINDS[name]
@@ -262,6 +327,72 @@ def test_a_press_without_a_job_presses_nothing(product):
                 pass
             assert answer["why"]
     assert product.begun == []
+
+
+@pytest.fixture
+def job(product):
+    """A job of an engineer that asks question 7, on a page that has the seat, and its number."""
+    browser, product.runs = page(product, MEI), True
+    assert browser.post("/start", {"cell": CELL, "job": "undo"}).status == 200
+    running = product.runs
+    try:
+        text = browser.get(f"/cell/{CELL}").body.decode()
+        yield browser, running, int(text.partition('data-number="')[2].partition('"')[0])
+    finally:
+        product.runs = False
+        product.board(CELL).job = None
+
+
+def answered(stream, **frame):
+    """Send a frame, and return what is said of it within the stream; ``None`` for nothing."""
+    stream.send(**frame)
+    stream.send(t="stop", press="after", age_ms=6000)
+    while (answer := stream.next())["t"] not in ("refused", "stopped"):
+        pass
+    if answer["t"] == "refused":
+        while stream.next()["t"] != "stopped":
+            pass
+        return answer["why"]
+    return None
+
+
+def test_a_press_for_another_question_presses_nothing(job):
+    browser, running, number = job
+    with browser.live() as stream:
+        others = (7, number - 1, number + 1, 0, -number, str(number), None, True, number + 0.5)
+        for other in others:
+            why = answered(stream, t="press", number=other, action="yes", press="p")
+            assert "has changed" in why
+        answered(stream, t="hold", number=number - 1, axis="x+", finger="f")
+        assert running.heard == []
+        assert answered(stream, t="press", number=number, action="yes", press="p") is None
+        (heard,) = running.heard
+        assert (heard["number"], heard["action"]) == (7, "yes")
+
+
+def test_what_another_tablet_recorded_and_sends_again_presses_nothing(product, job):
+    browser, running, number = job
+    thief = page(product, who=None)
+    for jar in ({}, {key: value for key, value in browser.jar.items() if "login" in key}):
+        thief.jar |= jar
+        with thief.live() as stream:
+            for kind in ("press", "hold", "beat"):
+                answered(stream, t=kind, number=number, action="yes", axis="x+", finger="f")
+    assert running.heard == []
+
+
+def test_an_operator_does_not_go_on_with_what_an_engineer_began(product, job):
+    _, running, number = job
+    jon = page(product, JON)  # the robot rests: the seat may be taken
+    with jon.live() as stream:
+        for action in ("yes", "write", "confirm", "start", "take", "answer", "choose"):
+            why = answered(stream, t="press", number=number, action=action, press="p")
+            assert MEI in why
+        answered(stream, t="hold", number=number, axis="x+", finger="f")
+        assert running.heard == []
+        # Ending it is always allowed.
+        assert answered(stream, t="press", number=number, action="leave", press="p") is None
+        assert [heard["action"] for heard in running.heard] == ["leave"]
 
 
 def test_a_stop_is_answered_whatever_is_stale(product):

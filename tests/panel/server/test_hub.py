@@ -8,7 +8,7 @@ import pytest
 from robolink_cli.panel import hub as hub_module
 from robolink_cli.panel.hub import BEAT_S, Hub, LivePage, PanelCell, may_begin
 from robolink_cli.panel.jobs import KINDS, JobEnd
-from robolink_cli.panel.pages import Parts, Watcher
+from robolink_cli.panel.pages import Pages, Parts, Watcher
 from robolink_cli.panel.watch import CellWatch, Look, Standing, card_of
 from robolink_cli.wizard.views.records import Head, QuestionView, Status, View
 
@@ -17,7 +17,7 @@ from robolink.model import Marker, MarkerKind
 CELL = PanelCell("line3", "epson+tcp://192.0.2.1:5000")
 
 
-class FewPages:
+class FewPages(Pages):
     """Draws a view as its question, and counts."""
 
     def __init__(self):
@@ -54,6 +54,9 @@ class FakeJob:
 
     def alive(self):
         self.alives += 1
+
+    async def wait(self):
+        return None
 
 
 def view(number, question="?", age_s=0.1):
@@ -231,10 +234,6 @@ def test_a_job_that_ended_without_order_is_told_and_on_record(hub, noted, monkey
         job.end = JobEnd(None, (), "Traceback of a child")
         before = board.number
 
-        async def wait():
-            return None
-
-        job.wait = wait
         await hub._until_end(board, job)
         return board, before
 

@@ -249,7 +249,7 @@ def test_a_job_that_ended_without_order_is_told_and_on_record(hub, noted, monkey
 
 
 def watch(look=None):
-    found = CellWatch("line3", CELL.url, None, lambda: None)
+    found = CellWatch("line3", CELL.url, None, lambda: None, asyncio.Semaphore(1))
     found.look = look
     return found
 
@@ -313,7 +313,7 @@ def test_a_look_is_made_for_a_page_or_where_the_cell_file_asks_for_it():
     never.look = Look(100.0, AT, READY)
     assert not never.is_due(10_000.0, wanted=False), "an idle cell was polled"
     assert not never.is_due(101.0, wanted=True), "six tabs would poll it"
-    often = CellWatch("line3", CELL.url, 30.0, lambda: None)
+    often = CellWatch("line3", CELL.url, 30.0, lambda: None, asyncio.Semaphore(1))
     assert often.is_due(0.0, wanted=False)
     often.look = Look(100.0, AT, READY)
     assert not often.is_due(129.0, wanted=False)

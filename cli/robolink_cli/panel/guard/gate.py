@@ -151,7 +151,7 @@ class _Gate:
             body, refusal = await _body(request, receive)
         document = parsed(body) if refusal is None else None
         if refusal is None and document is None:
-            refusal = Refusal(400, tr("This is no JSON object."), "form")
+            refusal = Refusal(400, tr("The panel does not understand this message."), "form")
         if refusal is None and document is not None and need in (Need.PERSON, Need.COMMAND):
             refusal = self._command(request, document.get("cell"), need)
         if refusal is not None or document is None:
@@ -174,7 +174,7 @@ class _Gate:
             return refusal
         kind = (request.one(b"content-type") or "").partition(";")[0].strip().lower()
         if kind != "application/json" or request.scope["query_string"]:
-            return Refusal(415, tr("This is no JSON object."), "form")
+            return Refusal(415, tr("The panel does not understand this message."), "form")
         paired = access.is_paired(visit.tablet)
         if paired and (refusal := self._place(visit)):
             return refusal
@@ -194,7 +194,7 @@ class _Gate:
     def _command(self, request: Request, cell: object, need: Need) -> Refusal | None:
         access = self._access
         if not isinstance(cell, str):
-            return Refusal(400, tr("This is no JSON object."), "form")
+            return Refusal(400, tr("The panel does not understand this message."), "form")
         tablet = access.tablet_of(request.scope)
         if why := access.why_not(tablet, cell, young=need is Need.COMMAND):
             return Refusal(403, why, "person")
@@ -211,7 +211,7 @@ class _Gate:
         access, pairs = self._access, request.path == PAIRING
         who, pin = document.get("name"), document.get("pin")
         if not (isinstance(who, str) and isinstance(pin, str)) or len(who + pin) > _MOST_TYPED:
-            refusal: Refusal | None = Refusal(400, tr("This is no JSON object."), "form")
+            refusal: Refusal | None = Refusal(400, tr("The panel does not understand this message."), "form")
         else:
             refusal = await access.prove(who, pin, visit)
         if refusal is not None:

@@ -118,6 +118,7 @@ function put(frame) {
   composing = composing && !other;
   if (other && held) release();
   number = frame.number;
+  data.number = String(number);
   data.screen = frame.screen;
   for (const [id, html] of Object.entries(parts)) exchange(place(id), html, other);
   if (other) {

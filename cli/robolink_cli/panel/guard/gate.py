@@ -298,7 +298,7 @@ class _Gate:
     ) -> None:
         facts: dict[str, object] = {"address": visit.address, "path": request.path[:100]}
         if isinstance(who, str):
-            facts["who"] = who[:100]
+            facts["typed_name"] = who[:100]  # of whom nobody knows whether it is true
         self._access.audit.note("refused", "", why=refusal.kind, **facts)
 
 

@@ -15,15 +15,19 @@ from urllib.parse import quote
 
 from starlette.applications import Starlette
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from robolink.errors import RobolinkError
 from robolink.locale.languages import language_named
 from robolink.messages import in_english, tr
+from robolink_cli.panel.cards import ChangeRow, ChartCard
 from robolink_cli.panel.guard.access import Access
+from robolink_cli.panel.guard.live import ANYTIME
 from robolink_cli.panel.guard.pairing import Tablet
 from robolink_cli.panel.guard.requests import MOST_BYTES, parsed
+from robolink_cli.panel.history import changes_of, charts_of, page_of
 from robolink_cli.panel.hub import Hub, LivePage, may_begin
 from robolink_cli.panel.jobs import KINDS, end_all, options_of
 from robolink_cli.panel.pages import HERE, Pages, Watcher
@@ -67,6 +71,8 @@ class Panel:
             routes=[
                 Route("/", self._overview),
                 Route("/cell/{cell}", self._cell),
+                Route("/cell/{cell}/history", self._history),
+                Route("/cell/{cell}/report/{change}", self._report),
                 Route("/login", self._login),
                 Route("/pair", self._pair),
                 Route("/static/{name}", self._static),
@@ -78,6 +84,7 @@ class Panel:
                 Route("/start", self._start, methods=["POST"]),
                 Route("/tablet", self._set_taste, methods=["POST"]),
             ],
+            exception_handlers={RobolinkError: _told},  # type: ignore[dict-item]
             lifespan=self._living,
         )
 
@@ -137,6 +144,34 @@ class Panel:
                 token=self._token(request),
             )
         )
+
+    async def _history(self, request: Request) -> Response:
+        board = self.hub.boards.get(request.path_params["cell"])
+        if board is None:
+            return _nothing_here()
+        watcher, url = self._watcher(request, board.name), board.cell.url
+
+        def found() -> tuple[tuple[ChangeRow, ...], tuple[ChartCard, ...]]:
+            return changes_of(url), charts_of(url)
+
+        changes, charts = await asyncio.to_thread(found)
+        return HTMLResponse(
+            self._pages.page(
+                "history",
+                watcher,
+                cell=board.name,
+                changes=changes,
+                charts=charts,
+                token=self._token(request),
+            )
+        )
+
+    async def _report(self, request: Request) -> Response:
+        board = self.hub.boards.get(request.path_params["cell"])
+        if board is None:
+            return _nothing_here()
+        change = request.path_params["change"]
+        return HTMLResponse(await asyncio.to_thread(page_of, board.cell.url, change))
 
     async def _login(self, request: Request) -> Response:
         return self._about_people("login", request)
@@ -230,6 +265,10 @@ class Panel:
             self._note("refused", live.cell, why="number", **facts)
             with speaking_in(self._tastes.of(tablet.id).language):
                 return tr("The screen has changed. Nothing was pressed.")
+        why = self._access.why_not_answer(tablet, live.cell, job.who)
+        if why and action not in ANYTIME:
+            self._note("refused", live.cell, why="role", **facts)
+            return why
         question = in_english(job.view.head.title) if job.view is not None else ""
         self._note("answer", live.cell, question=question, **facts)
         job.press(board.question(), action, value)
@@ -247,6 +286,8 @@ class Panel:
             job.beat(finger)
         elif frame.get("number") == board.number:
             tablet, axis = self._access.tablet_of(socket.scope), _text(frame.get("axis"))
+            if self._access.why_not_answer(tablet, live.cell, job.who):
+                return
             facts = {"tablet": tablet.id[:_ID], "who": tablet.who, "action": "hold"}
             self._note("answer", live.cell, value=axis, **facts)
             job.hold(board.question(), axis, finger)
@@ -373,6 +414,11 @@ class Panel:
         self._tastes.set(tablet.id, language, dark if isinstance(dark, bool) else None)
         self.hub.everything_changed(tablet.id)
         return JSONResponse({})
+
+
+async def _told(_: Request, error: RobolinkError) -> Response:
+    """Answer with what is wrong and what to do, in place of a page."""
+    return PlainTextResponse(f"{error.what}\n{error.remedy}", 503)
 
 
 def _nothing_here() -> Response:

@@ -16,6 +16,7 @@ from typing import Any, Final, Protocol
 from robolink.errors import RobolinkError
 from robolink.messages import spoken, tr
 from robolink.transport import far_end_of
+from robolink_cli.console.output import show
 from robolink_cli.panel.cards import CellCard, JobOffer
 from robolink_cli.panel.jobs import KINDS, Job, JobKind
 from robolink_cli.panel.pages import Pages, Parts, Watcher
@@ -345,9 +346,10 @@ class Hub:
         board.watch.look = None  # how it was before the job says nothing
         board.opened = any(live.cell == board.name for live in self.lives)
         if end is not None:
-            board.said = end.kept if end.in_order else _lost(job.language, end.errors)
+            board.said = end.kept if end.in_order else _lost(job.language)
             if not end.in_order:
                 self._note("job_lost", board.name, job=job.kind.name)
+                show(end.errors, beside=True)  # for whoever runs the panel
         await self.read_standing(board)
 
     # Pages.
@@ -444,7 +446,6 @@ def keys_of(cell: PanelCell) -> frozenset[str]:
         return frozenset()
 
 
-def _lost(language: str, errors: str) -> tuple[str, ...]:
+def _lost(language: str) -> tuple[str, ...]:
     with speaking_in(language):
-        said = tr("The job's process ended without saying how. What it began is on record.")
-    return (said, *errors.splitlines()[-3:])
+        return (tr("The job's process ended without saying how. What it began is on record."),)

@@ -101,6 +101,9 @@ class Job:
         end: How it ended; ``None`` while it runs.
     """
 
+    program = "robolink_cli.job_process"
+    """The module that is run."""
+
     def __init__(
         self,
         cell: str,
@@ -147,7 +150,7 @@ class Job:
             its.set_inheritable(True)
             self._process = await asyncio.create_subprocess_exec(
                 sys.executable,
-                *("-m", "robolink_cli.job_process", str(its.fileno()), *self.arguments),
+                *("-m", self.program, str(its.fileno()), *self.arguments),
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.DEVNULL,
                 stderr=asyncio.subprocess.PIPE,

@@ -3,9 +3,11 @@
 import asyncio
 import signal
 import socket
+import ssl
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import uvicorn
@@ -41,6 +43,12 @@ class Place:
     port: int
     certificate: str = ""
     key: str = ""
+
+    def context(self, *_: object) -> ssl.SSLContext:
+        """Return what TLS takes of the certificate."""
+        from robolink_cli.panel.guard.tls import context
+
+        return context(Path(self.certificate), Path(self.key))
 
     def url(self, port: int) -> str:
         """Return what is opened in a browser."""
@@ -106,6 +114,7 @@ async def serve(
             timeout_graceful_shutdown=_LAST_ANSWERS_S,
             ssl_certfile=place.certificate or None,
             ssl_keyfile=place.key or None,
+            ssl_context_factory=place.context if place.certificate else None,
             **access.server_options(),
         )
         server = _Server(config)

@@ -220,6 +220,9 @@ class StopProcess:
     """The process that carries stops out; a context manager.
 
     It is kept ready, and started anew where it has ended.
+
+    Attributes:
+        ready: Whether it has loaded what a stop takes.
     """
 
     def __init__(self) -> None:
@@ -228,6 +231,8 @@ class StopProcess:
         self._waiting: dict[int, tuple[threading.Event, asyncio.Future[StopAnswer], Any]] = {}
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
+        self.ready = threading.Event()
+        self._listens: threading.Thread | None = None
         self._start()
 
     def __enter__(self) -> "StopProcess":
@@ -256,6 +261,8 @@ class StopProcess:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+            if self._listens is not None:
+                self._listens.join()
 
     async def __call__(self, asked: StopAsked) -> StopAnswer:
         """Stop one cell."""
@@ -292,7 +299,7 @@ class StopProcess:
         taken = threading.Event()
         with self._lock:
             process = self._process
-            if process is None or process.stdin is None:
+            if process is None or process.stdin is None or not self.ready.is_set():
                 return False
             self._number += 1
             number = self._number
@@ -322,28 +329,38 @@ class StopProcess:
                 stdout=subprocess.PIPE,
                 start_new_session=os.name != "nt",  # Ctrl-C is for the panel, which then ends it
             )
-        threading.Thread(target=self._listen, args=(process,), name="stops", daemon=True).start()
+        self._listens = threading.Thread(
+            target=self._listen, args=(process,), name="stops", daemon=True
+        )
+        self._listens.start()
 
     def _listen(self, process: "subprocess.Popen[bytes]") -> None:
         began_s = time.monotonic()
-        assert process.stdout is not None  # noqa: S101 - it was asked for
-        for line in process.stdout:
-            with suppress(ValueError, KeyError, TypeError):
-                self._heard(json.loads(line))
+        assert process.stdin is not None and process.stdout is not None  # noqa: S101, PT018 - pipes
+        with process.stdout:
+            for line in process.stdout:
+                with suppress(ValueError, KeyError, TypeError):
+                    self._heard(json.loads(line))
+        with suppress(OSError):
+            process.stdin.close()
         process.wait()
         with self._lock:
             lost, self._waiting = self._waiting, {}
+            self.ready.clear()
             if self._process is process:
                 self._process = None
         for taken, end, loop in lost.values():
             if taken.is_set():
                 text = tr("The stop was begun, and nothing was heard of its end.")
                 _settle(loop, end, StopAnswer(StopEnd.FAILED, text))
-        time.sleep(max(0.0, _NEXT_START_S - (time.monotonic() - began_s)))
+        if not self._closed:
+            time.sleep(max(0.0, _NEXT_START_S - (time.monotonic() - began_s)))
         self._start()
 
     def _heard(self, said: dict[str, Any]) -> None:
         number = said["number"]
+        if number == 0:
+            self.ready.set()
         with self._lock:
             waiting = self._waiting.get(number)
             if waiting is None:
@@ -400,6 +417,7 @@ def main() -> None:
             answer = StopAnswer(StopEnd.FAILED, "\n".join(_told(error)), (asked.cell,))
         say({"number": number, **asdict(answer)})
 
+    say({"number": 0})
     for line in sys.stdin:
         try:
             said = json.loads(line)

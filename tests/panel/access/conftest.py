@@ -29,3 +29,11 @@ def far_panel(tmp_path):
     made.set_pins()
     with made.served():
         yield made
+
+
+@pytest.fixture
+def state_folder(tmp_path, monkeypatch):
+    """The test's own state folder and working folder; returns the first."""
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "state"

@@ -1,4 +1,4 @@
-"""The other end of a job's wire: reads views, and presses as a page would; in a thread beside it."""
+"""The other end of a job's wire: reads views, and presses as a page would, in a thread."""
 
 import json
 import select
@@ -6,7 +6,10 @@ import socket
 import threading
 import time
 from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
+from robolink_cli import job_process
 from robolink_cli.wizard.views.records import (
     CheckView,
     ChoiceView,
@@ -18,6 +21,7 @@ from robolink_cli.wizard.views.records import (
 )
 from robolink_cli.wizard.views.wire import from_wire
 
+RECIPE = Path(__file__).parents[3] / "examples" / "recipes" / "needle-one-touch.toml"
 SIZES = (5.0, 1.0, 0.5, 0.1, 0.01)
 
 
@@ -39,7 +43,9 @@ class Tablet:
     """
 
     def __init__(self, wire, *, lives=True):
-        self.wire, self.view, self.views, self.told, self.left = wire, None, [], [], None
+        self.wire, self.views, self.told = wire, [], []
+        self.view: Any = None
+        self.left: Any = None
         self.came_s = []
         self._held = b""
         self._lock = threading.Lock()
@@ -106,6 +112,14 @@ class Tablet:
         time.sleep(0.32)  # longer than a press is ignored for
         self.read(0.0)
         return self.view.body
+
+    def changes(self, body):
+        """Wait until something else is shown."""
+        return self.see(lambda view: view.body != body)
+
+    def goes_on(self, number):
+        """Wait until something else is asked, or nothing."""
+        return self.see(lambda view: view.number != number)
 
     def press(self, action, value="", number=None):
         number = self.view.number if number is None else number
@@ -178,7 +192,7 @@ def change(tablet, eyes, needle="N-0418"):
                 todo = [row for row in rows if row.mark in ("you", "to do") and not row.confirmed]
                 if left:
                     tablet.press("confirm", todo[0].name)
-                    tablet.see(lambda view: view.body != body)
+                    tablet.changes(body)
                     continue
                 tablet.press("start")
             case TouchView():
@@ -197,7 +211,14 @@ def change(tablet, eyes, needle="N-0418"):
                 tablet.press("choose", rows[0].value)
             case EndView():
                 return body
-        tablet.see(lambda view: view.number != number)
+        tablet.goes_on(number)
+
+
+def to_the_jog(tablet):
+    """Agree to a jog by hand, and wait for its pad."""
+    tablet.body(QuestionView)
+    tablet.press("yes")
+    tablet.body(TouchView)
 
 
 def at_the_wire(arguments, script, *, lives=True):
@@ -221,7 +242,7 @@ def at_the_wire(arguments, script, *, lives=True):
 
     thread = threading.Thread(target=play, daemon=True)
     thread.start()
-    code = job.run(theirs, arguments)
+    code = job_process.run(theirs, arguments)
     thread.join(30.0)
     if failed:
         raise failed[0]

@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.model import Secret
 from robolink_cli.commands.simulate.service import host_and_port
 from robolink_cli.console.language import language_now
@@ -23,6 +24,7 @@ from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
     from robolink.config import Cell
+    from robolink_cli.commands.simulate.panel_cells import DemoCells
     from robolink_cli.panel.hub import PanelCell
     from robolink_cli.panel.serving import Place, Served
 
@@ -30,7 +32,13 @@ NEEDED: Final = ("starlette", "uvicorn", "websockets")
 """Packages of the extra, without which no page is served."""
 
 
-SUBCOMMANDS: Final[dict[str, tuple[str, str]]] = {}
+_ACCESS: Final = "robolink_cli.commands.computer.panel_access"
+
+SUBCOMMANDS: Final = {
+    "pin": (f"{_ACCESS}:pin", declared("Set the PIN of a person, or of this computer.")),
+    "tablets": (f"{_ACCESS}:tablets", declared("List the paired tablets; forget one.")),
+    "cert": (f"{_ACCESS}:cert", declared("Make a certificate, for tablets on the network.")),
+}
 """What else there is about the panel, as :class:`~robolink_cli.lazy_group.LazyGroup` takes it."""
 
 
@@ -83,16 +91,20 @@ def panel(
         raise click.UsageError(tr("--demo has cells of its own: leave --cells out."))
     host, port = host_and_port(listen, "--listen")
     with ExitStack() as stack:
-        told: list[str] = []
-        if demo:
-            cells, told = _demo(stack)
+        simulated = _demo(stack) if demo else None
+        if simulated is not None:
+            cells = simulated.cells_file
         if cells is not None:
             os.environ["ROBOLINK_CONFIG"] = str(cells.absolute())
-        place = _place(host, port, certificate, key)
-        served = _served(cells)
+        place, names = _place(host, port, certificate, key)
+        served = _served(cells, names)
+        from robolink_cli.panel.guard.audit import Audit
         from robolink_cli.panel.serving import run
 
-        run(served, place, lambda url: _announce(url, served, told))
+        audit = Audit({cell.name: cell.url for cell in served.cells})
+        stack.callback(audit.close)
+        served = replace(served, audit=audit)
+        run(served, place, lambda url: _announce(url, served, simulated))
 
 
 def require_packages(names: tuple[str, ...]) -> None:
@@ -109,54 +121,49 @@ def require_packages(names: tuple[str, ...]) -> None:
         )
 
 
-def _demo(stack: ExitStack) -> tuple[Path, list[str]]:
-    """Serve simulated cells until a stack is closed; return their cell file, and what to say."""
+def _demo(stack: ExitStack) -> "DemoCells":
+    """Serve simulated cells until a stack is closed, with a state folder and a PIN of their own."""
     from robolink_cli.commands.simulate.panel_cells import demo_cells
     from robolink_cli.panel.guard.people import NOBODY, Pins
 
     cells = stack.enter_context(demo_cells())
     os.environ["ROBOLINK_STATE_DIR"] = str(cells.state)
-    os.chdir(cells.folder)  # jobs find the recipes that lie there
     stack.callback(os.chdir, os.getcwd())
-    pin = _drawn_pin()
-    Pins().set(NOBODY, Secret(pin))
-    told = [tr("SIMULATED: nothing real moves."), tr("PIN for moving and writing: {pin}", pin=pin)]
-    told += [
-        tr(
-            "To see how far a tip is from its pin: {command}",
-            command=f"robolink sim assist {one} look",
-        )
-        for one in cells.assists.values()
-    ]
-    return cells.cells_file, told
+    os.chdir(cells.folder)  # jobs find the recipes that lie there
+    Pins().set(NOBODY, Secret(cells.pin))
+    return cells
 
 
-def _drawn_pin() -> str:
-    import secrets
-
-    return f"{secrets.randbelow(9) + 1}{secrets.randbelow(10**6):06}2"
-
-
-def _place(host: str, port: int, certificate: Path | None, key: Path | None) -> "Place":
-    """Return where the panel is served.
+def _place(
+    host: str, port: int, certificate: Path | None, key: Path | None
+) -> "tuple[Place, tuple[str, ...]]":
+    """Return where the panel is served, and the names of its certificate.
 
     Raises:
-        ConfigError: Other computers could reach it, and there is no TLS.
+        ConfigError: Other computers could reach it, and there is no TLS; or the certificate cannot
+            be used.
     """
     from robolink_cli.panel.guard.access import is_loopback
     from robolink_cli.panel.serving import Place
 
     if (certificate is None) != (key is None):
         raise click.UsageError(tr("--tls-cert and --tls-key go together."))
-    if certificate is None and not is_loopback(host):
+    if certificate is None and is_loopback(host):
+        return Place(host, port), ()
+    require_packages(("cryptography",))
+    from robolink_cli.panel.guard import tls
+
+    path, own_key = (certificate, key) if certificate and key else tls.own_files()
+    if certificate is None and not path.exists():
         raise ConfigError(
             tr("Other computers can reach {host}, so the panel needs TLS there.", host=host),
-            remedy=tr("Give --tls-cert and --tls-key."),
+            remedy=tr("Run 'robolink panel cert', or give --tls-cert and --tls-key."),
         )
-    return Place(host, port, str(certificate or ""), str(key or ""))
+    found = tls.load(path, own_key)
+    return Place(host, port, str(found.path), str(found.key)), found.names
 
 
-def _served(cells_file: Path | None) -> "Served":
+def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
     """Return what the panel shows, and to whom.
 
     Raises:
@@ -185,6 +192,7 @@ def _served(cells_file: Path | None) -> "Served":
     return Served(
         tuple(_shown(cell) for cell in found.values()),
         {name: cell.settings.people for name, cell in found.items()},
+        names,
         language=language_now(),
     )
 
@@ -195,15 +203,19 @@ def _shown(cell: "Cell") -> "PanelCell":
     return PanelCell(cell.name, cell.url, cell.settings.watch_s)
 
 
-def _announce(url: str, served: "Served", told: list[str]) -> None:
+def _announce(url: str, served: "Served", simulated: "DemoCells | None") -> None:
     """Tell where the panel is, once it listens."""
     if json_is_on():
-        names = [cell.name for cell in served.cells]
-        about = {"url": url, "cells": names, "pid": os.getpid()}
-        hand_over(json.dumps({"schema": "robolink/panel/1", **about}))
+        about = {"url": url, "cells": [cell.name for cell in served.cells], "pid": os.getpid()}
+        demo = None if simulated is None else simulated.payload()
+        hand_over(json.dumps({"schema": "robolink/panel/1", **about, "demo": demo}))
         return
     say(tr("Open {url} in a browser.", url=url))
-    for line in told:
-        say(line)
+    if simulated is not None:
+        say(tr("SIMULATED: nothing real moves."))
+        say(tr("PIN for moving and writing: {pin}", pin=simulated.pin))
+        for assist in simulated.assists.values():
+            command = f"robolink sim assist {assist} look"
+            say(tr("To see how far a tip is from its pin: {command}", command=command))
     say(tr("Ctrl-C ends it."))
     sys.stdout.flush()

@@ -276,6 +276,21 @@ class Access:
             return tr("The PIN was given more than 15 minutes ago. Give it again.")
         return ""
 
+    def why_not_answer(self, tablet: Tablet, cell: str, begun_by: str) -> str:
+        """Return why a tablet may not answer a job; empty where it may.
+
+        A job has the rights of who began it: an operator does not go on with an engineer's.
+
+        Args:
+            tablet: The tablet.
+            cell: Name of the cell.
+            begun_by: Who began the job.
+        """
+        mine, needed = self.role_at(tablet, cell), self.role(begun_by, cell)
+        if mine is PersonRole.ENGINEER or (mine is not None and mine is needed):
+            return ""
+        return tr("{who} began this as an engineer: an engineer has to go on.", who=begun_by)
+
     def _missing_pin(self, cell: str) -> str:
         people = self.people[cell]
         if people is None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -35,6 +36,13 @@ CONTENT_SECURITY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
 )
+REPORT_SECURITY: Final = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; "
+    "base-uri 'none'; form-action 'none'"
+)
+"""Of a report, one page to keep and print: it has its styles in it, and no script may run."""
+
+_REPORT: Final = re.compile(r"/cell/[^/]+/report/[^/]+")
 _HEADERS: Final = {
     b"content-security-policy": CONTENT_SECURITY.encode(),
     b"x-content-type-options": b"nosniff",
@@ -360,7 +368,10 @@ class _Answer:
         if self.visit.secret and (self.visit.fresh or (page and self.request.keeps_cookies)):
             cookie = self.access.cookie("tablet", self.visit.secret)
             kept.append((b"set-cookie", cookie.encode()))
-        return [*kept, *_HEADERS.items()]
+        headers = dict(_HEADERS)
+        if _REPORT.fullmatch(self.request.path):
+            headers[b"content-security-policy"] = REPORT_SECURITY.encode()
+        return [*kept, *headers.items()]
 
 
 async def _body(request: Request, receive: Receive) -> tuple[bytes, Refusal | None]:

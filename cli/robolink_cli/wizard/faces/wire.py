@@ -49,11 +49,13 @@ class WireFace:
         self._sent: View | None = None
         self._sent_s = 0.0
         self._left = False
+        self._stepped: int | None = None
 
     def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
         """Show it until the work has ended and a person has left the last screen."""
         self._desk, self._state, self._work = desk, state, work
         self._left = False
+        desk.silent_s = self._link.silent_s
         while True:
             ended = work.ended  # before what happened is asked for, so that nothing is missed
             for happening in desk.happened():
@@ -87,16 +89,24 @@ class WireFace:
         """Send the next step of a key that is held, when the last one has ended."""
         hold, state, now_s = self._link.held(), self._state, time.monotonic()
         if hold is None:
+            self._stepped = None
             return
         question = state.question
         if question is None or not state.at_place or question.number != hold.number:
             self._link.end_held()
             return
+        if state.waits and self._stepped == state.jogging.steps:
+            self._link.end_held()  # the step was not made: at a limit, or not permitted
+            self._stepped = None
+            return
         if not state.waits or now_s - question.at_s < ARMED_AFTER_S:
+            return
+        if not self._link.spend_sign():
             return
         step = min(state.jogging.step, LONGEST_HELD_STEP)
         self._happens(Pressed(hold.number, "jog", f"{hold.axis}{step:g}", now_s))
-        if self._state.waits:
+        self._stepped = None if self._state.waits else state.jogging.steps
+        if self._stepped is None:
             self._link.end_held()  # it was refused, and would be again
 
     def _show(self) -> None:

@@ -243,7 +243,7 @@ async function post({what, form}) {
   if (!answer.ok) {
     note(said.why, answer.status === 403 && !form);
     if (form) for (const input of form.querySelectorAll("[type=password]")) input.value = "";
-  } else if (form && form.dataset.onward) location.assign(form.dataset.onward);
+  } else if (form && form.dataset.onward) location.replace(form.dataset.onward);
   else if (what.then === "reload") location.reload();
 }
 

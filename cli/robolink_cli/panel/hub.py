@@ -18,7 +18,7 @@ from robolink.messages import spoken, tr
 from robolink.transport import far_end_of
 from robolink_cli.console.output import show
 from robolink_cli.panel.cards import CellCard, JobOffer
-from robolink_cli.panel.jobs import KINDS, Job, JobKind
+from robolink_cli.panel.jobs import KINDS, JobKind, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
 from robolink_cli.panel.watch import AT_ONCE, CellWatch, Standing, card_of, standing_of
 from robolink_cli.panel.words import speaking_in
@@ -95,7 +95,7 @@ class Board:
         self._changed = changed
         self.watch = CellWatch(cell.name, cell.url, cell.watch_s, self.renew, slots)
         self.standing = Standing()
-        self.job: Job | None = None
+        self.job: PanelJob | None = None
         self.said: tuple[str, ...] = ()
         self.base = (1 + secrets.randbelow(1000)) * _NUMBERS
         self.opened = False
@@ -194,7 +194,7 @@ class Board:
             return tr("This takes an engineer.")
         return ""
 
-    def _busy(self, watcher: Watcher, job: Job, seat: str) -> CellCard:
+    def _busy(self, watcher: Watcher, job: PanelJob, seat: str) -> CellCard:
         view = job.view
         title = spoken(job.kind.title)
         lines = [title] if view is None else [f"{title}: {view.head.title}"]
@@ -323,7 +323,7 @@ class Hub:
         Raises:
             OSError: It cannot be started.
         """
-        job = Job(
+        job = PanelJob(
             board.name,
             kind,
             language=language,
@@ -341,7 +341,7 @@ class Hub:
         board.renew()
         self.spawn(self._until_end(board, job))
 
-    async def _until_end(self, board: Board, job: Job) -> None:
+    async def _until_end(self, board: Board, job: PanelJob) -> None:
         await job.wait()
         end = job.end
         if board.job is job:

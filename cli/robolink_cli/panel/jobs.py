@@ -86,7 +86,7 @@ class JobEnd:
         return self.code is not None
 
 
-class Job:
+class PanelJob:
     """One job of one cell.
 
     Args:
@@ -159,7 +159,7 @@ class Job:
                 stdout=asyncio.subprocess.DEVNULL,
                 stderr=asyncio.subprocess.PIPE,
                 pass_fds=(its.fileno(),),
-                env={**os.environ, VARIABLE: self.language},
+                env={**os.environ, VARIABLE: self.language, "PYTHONIOENCODING": "utf-8"},
                 start_new_session=True,  # Ctrl-C is for the panel, which then ends it in order
             )
         except BaseException:
@@ -276,7 +276,7 @@ def options_of(kind: JobKind, given: object) -> dict[str, str]:
     }
 
 
-async def end_all(jobs: Iterable[Job], wait_s: float) -> list[Job]:
+async def end_all(jobs: Iterable[PanelJob], wait_s: float) -> list[PanelJob]:
     """End jobs in order; return those that take longer, and end by themselves."""
     running = [job for job in jobs if job.end is None]
     ended = await asyncio.gather(*(job.close(wait_s) for job in running))

@@ -147,7 +147,7 @@ def _shorter(view: View) -> View:
         case WaitView(told=told) | QuestionView(told=told):
             return replace(view, body=replace(body, told=_half(told)))
         case _:
-            return replace(view, body=WaitView((tr("This is too long to be shown here."),)))
+            return replace(view, body=WaitView((tr("The rest is too long to be shown here."),)))
 
 
 def _half(lines: tuple[str, ...]) -> tuple[str, ...]:

@@ -71,12 +71,17 @@ class PanelCell:
         url: Its controller.
         watch_s: How often it is looked at; ``None`` for only when a page is opened.
         simulated: Whether nothing real moves, as far as its URL says.
+        stations: Names of its stations.
+        tool: The tool that works there, with which stations are found; ``None`` where the cell
+            file says none.
     """
 
     name: str
     url: str
     watch_s: float | None = None
     simulated: bool = False
+    stations: tuple[str, ...] = ()
+    tool: int | None = None
 
 
 class Board:
@@ -176,15 +181,40 @@ class Board:
 
     def offers(self, watcher: Watcher) -> tuple[JobOffer, ...]:
         """Return the jobs that can be begun, in the language that is spoken."""
-        return tuple(
-            JobOffer(kind.name, spoken(kind.title), why_not=self._why_not(kind, watcher))
-            for kind in KINDS.values()
-            if self._is_of_use(kind)
-        )
+        found = list[JobOffer]()
+        for kind in filter(self._is_of_use, KINDS.values()):
+            why_not = self._why_not(kind, watcher)
+            if kind.of_station:
+                found += [
+                    JobOffer(
+                        kind.name,
+                        tr("Find the station {station} again", station=station),
+                        values={"station": station},
+                        why_not=why_not,
+                    )
+                    for station in self.cell.stations
+                ]
+            else:
+                found.append(JobOffer(kind.name, spoken(kind.title), why_not=why_not))
+        return tuple(found)
+
+    def station(self, kind: JobKind, given: object) -> tuple[str, int] | None:
+        """Return the station of a job and the tool that finds it; ``None`` where it has none.
+
+        Args:
+            kind: The job.
+            given: ``values`` of the press.
+        """
+        named = given.get("station") if isinstance(given, Mapping) else None
+        if not kind.of_station or self.cell.tool is None or named not in self.cell.stations:
+            return None
+        return str(named), self.cell.tool
 
     def _is_of_use(self, kind: JobKind) -> bool:
         if kind.name == "recover":
             return bool(self.standing.interrupted)
+        if kind.of_station:
+            return self.cell.tool is not None
         return kind.name != "release" or self.standing.stopped is not None
 
     def _why_not(self, kind: JobKind, watcher: Watcher) -> str:
@@ -316,7 +346,14 @@ class Hub:
     # Jobs.
 
     async def begin(
-        self, board: Board, kind: JobKind, *, language: str, who: str, values: Mapping[str, str]
+        self,
+        board: Board,
+        kind: JobKind,
+        *,
+        language: str,
+        who: str,
+        values: Mapping[str, str],
+        station: tuple[str, int] | None = None,
     ) -> None:
         """Begin a job on a cell that has none.
 
@@ -330,6 +367,7 @@ class Hub:
             who=who,
             changed=board.renew,
             values=values,
+            station=station,
         )
         board.next_numbers()
         board.job, board.said = job, ()

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from robolink_cli.panel import hub as hub_module
 from robolink_cli.panel.hub import BEAT_S, Hub, LivePage, PanelCell, may_begin
-from robolink_cli.panel.jobs import KINDS, JobEnd
+from robolink_cli.panel.jobs import KINDS, JobEnd, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
 from robolink_cli.panel.watch import CellLook, CellWatch, Standing, card_of
 from robolink_cli.wizard.views.records import Head, QuestionView, Status, View
@@ -326,3 +326,32 @@ def test_an_operator_begins_what_is_an_operators():
     assert may_begin(KINDS["undo"], "engineer")
     for nobody in ("", "onlooker"):
         assert not any(may_begin(kind, nobody) for kind in KINDS.values())
+
+
+def test_each_station_of_the_cell_file_is_offered_and_no_other_is_taken():
+    cell = PanelCell("line3", CELL.url, stations=("PIN-07", "--yes"), tool=2)
+    board = Hub([cell], FewPages(), NoSeats(), lambda *_, **__: None).boards["line3"]
+    offered = [dict(one.values) for one in board.offers(Watcher(role="engineer")) if one.values]
+    assert offered == [{"station": "PIN-07"}, {"station": "--yes"}]
+    kind = KINDS["station"]
+    assert board.station(kind, {"station": "PIN-07"}) == ("PIN-07", 2)
+    for wrong in (None, "PIN-07", {}, {"station": "PIN-08"}, {"station": ["PIN-07"]}, {"tool": 1}):
+        assert board.station(kind, wrong) is None
+    assert board.station(KINDS["change"], {"station": "PIN-07"}) is None
+    job = PanelJob(
+        "line3",
+        kind,
+        language="en",
+        who="mei",
+        changed=lambda: None,
+        station=board.station(kind, {"station": "--yes"}),
+    )
+    learn = ["cell", "station", "learn", "--tool", "2", "--", "--yes"]
+    assert job.arguments == ["-c", "line3", "--operator", "mei", *learn]
+
+
+def test_a_cell_that_names_no_tool_finds_no_station():
+    cell = PanelCell("line3", CELL.url, stations=("PIN-07",))
+    board = Hub([cell], FewPages(), NoSeats(), lambda *_, **__: None).boards["line3"]
+    assert "station" not in {one.job for one in board.offers(Watcher(role="engineer"))}
+    assert board.station(KINDS["station"], {"station": "PIN-07"}) is None

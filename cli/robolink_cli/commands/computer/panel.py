@@ -201,7 +201,14 @@ def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
 def _shown(cell: "Cell") -> "PanelCell":
     from robolink_cli.panel.hub import PanelCell
 
-    return PanelCell(cell.name, cell.url, cell.settings.watch_s)
+    settings = cell.settings
+    return PanelCell(
+        cell.name,
+        cell.url,
+        settings.watch_s,
+        stations=tuple(settings.stations or ()),
+        tool=settings.tool,
+    )
 
 
 def _announce(url: str, served: "Served", simulated: "DemoCells | None") -> None:

@@ -73,16 +73,20 @@ def with_few_colours(png: bytes) -> bytes:
     """Return a picture with at most 256 colours, as a PNG with a palette."""
     wide, high, pixels = _pixels(png)
     rgb = pixels[:, :, :3].astype(np.uint32)
-    for bits in (4, 3, 2):
-        step = 255 / ((1 << bits) - 1)
-        level = np.rint(rgb / step).astype(np.uint32)
-        keys = (level[:, :, 0] << 16) | (level[:, :, 1] << 8) | level[:, :, 2]
-        found, index = np.unique(keys, return_inverse=True)
+    whole = (rgb[:, :, 0] << 16) | (rgb[:, :, 1] << 8) | rgb[:, :, 2]
+    colours, index, counts = np.unique(whole, return_inverse=True, return_counts=True)
+    for bits in (5, 4, 3, 2):
+        levels = ((colours[:, None] >> np.array([16, 8, 0])) & 255) >> (8 - bits)
+        keys = (levels[:, 0] << 16) | (levels[:, 1] << 8) | levels[:, 2]
+        found, group = np.unique(keys, return_inverse=True)
         if len(found) <= 256:
             break
-    levels = np.stack([(found >> 16) & 255, (found >> 8) & 255, found & 255], axis=1)
-    palette = np.rint(levels * step).astype(np.uint8).tobytes()
-    rows = index.reshape(high, wide).astype(np.uint8)
+    # Of colours that are alike the one that is there most often stands for all.
+    order = np.argsort(counts)
+    stands = np.zeros(len(found), np.uint32)
+    stands[group[order]] = colours[order]
+    palette = ((stands[:, None] >> np.array([16, 8, 0])) & 255).astype(np.uint8).tobytes()
+    rows = group[index].reshape(high, wide).astype(np.uint8)
     packed = zlib.compress(b"".join(b"\0" + row.tobytes() for row in rows), 9)
     head = struct.pack(">IIBBBBB", wide, high, 8, 3, 0, 0, 0)
     parts = ((b"IHDR", head), (b"PLTE", palette), (b"IDAT", packed), (b"IEND", b""))

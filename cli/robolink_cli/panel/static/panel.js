@@ -92,7 +92,7 @@ function look() {
     place("lost").hidden = !lost;
     if (lost) {
       say(place("lost").querySelector("[data-lost]"), {s: Math.floor((now() - lived) / 1000)});
-      say(place("lost").querySelector("[data-heard]"), {at: heardAt ? heardAt.toLocaleTimeString(document.documentElement.lang) : "?"});
+      say(place("lost").querySelector("[data-heard]"), {at: heardAt ? heardAt.toLocaleTimeString("en-GB") : "?"});
       say(place("lost").querySelector("[data-tried]"), {n: tries});
     } else if (!silent) tries = 0;
     if ((quiet > ANEW_MS || ended) && now() - begun >= 1000) connect();

@@ -13,7 +13,7 @@ from robolink_cli.wizard.views.records import (
     Arrow,
     CheckRow,
     CheckView,
-    ChoiceRow,
+    ListRow,
     ChoiceView,
     CoordinateRow,
     EndView,
@@ -80,14 +80,14 @@ def _english():
                 ("Controller EPSON RC90-B, serial 0815; tool 1 is selected.",),
                 "Which job?",
                 (
-                    ChoiceRow(
+                    ListRow(
                         "Needle 22G on the pin", "1", ("last done 26 Nov, Chen; about 4 min",)
                     ),
-                    ChoiceRow(
+                    ListRow(
                         "One touch", "2", ("full calibration due in 3 changes; about 1 min",)
                     ),
-                    ChoiceRow("Two nozzles", "3", ("never done here",)),
-                    ChoiceRow("Find station PIN-07 again", "4", ("engineers only",)),
+                    ListRow("Two nozzles", "3", ("never done here",)),
+                    ListRow("Find station PIN-07 again", "4", ("engineers only",)),
                 ),
                 0,
                 "Open",

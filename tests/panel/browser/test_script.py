@@ -4,7 +4,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from robolink_cli.wizard.views.records import ChoiceRow, QuestionView, Weight
+from robolink_cli.wizard.views.records import ListRow, QuestionView, Weight
 
 from tests.panel.browser import samples
 from tests.panel.browser.fingers import Fingers
@@ -198,7 +198,7 @@ def test_a_scanner_types_and_enter_answers(panel, page):
 
 def test_a_list_that_is_too_long_says_so_and_can_be_read_to_its_end(panel, page, fingers):
     view = samples.views("en")["choice"]
-    rows = tuple(ChoiceRow(f"Job {n}", str(n), ("what it does",)) for n in range(20))
+    rows = tuple(ListRow(f"Job {n}", str(n), ("what it does",)) for n in range(20))
     panel.show(replace(view, body=replace(view.body, rows=rows)))
     for _ in range(4):
         page.wait_for_selector("#more:visible")

@@ -30,19 +30,21 @@ _LAST_ANSWERS_S: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PanelPlace:
     """Where the panel is served.
 
     Attributes:
         host: Address or name of this computer.
         port: 0 for any that is free.
         certificate, key: Files of TLS; empty for none.
+        name: What a browser calls it; empty for ``host``.
     """
 
     host: str
     port: int
     certificate: str = ""
     key: str = ""
+    name: str = ""
 
     def context(self, *_: object) -> ssl.SSLContext:
         """Return what TLS takes of the certificate."""
@@ -53,7 +55,8 @@ class Place:
     def url(self, port: int) -> str:
         """Return what is opened in a browser."""
         scheme = "https" if self.certificate else "http"
-        host = f"[{self.host}]" if ":" in self.host else self.host
+        name = self.name or self.host
+        host = f"[{name}]" if ":" in name else name
         return f"{scheme}://{host}:{port}/"
 
 
@@ -77,7 +80,7 @@ class Served:
 
 
 async def serve(
-    served: Served, place: Place, *, ready: Callable[[str], None], ended: asyncio.Event
+    served: Served, place: PanelPlace, *, ready: Callable[[str], None], ended: asyncio.Event
 ) -> None:
     """Serve the panel until it is ended; then end its jobs in order.
 
@@ -133,7 +136,7 @@ async def serve(
             access.close()
 
 
-def _listening(place: Place, connections: Connections) -> socket.socket:
+def _listening(place: PanelPlace, connections: Connections) -> socket.socket:
     try:
         return listening(place.host, place.port, connections)
     except OSError as error:
@@ -157,7 +160,7 @@ class _Server(uvicorn.Server):
         yield
 
 
-def run(served: Served, place: Place, ready: Callable[[str], None]) -> None:
+def run(served: Served, place: PanelPlace, ready: Callable[[str], None]) -> None:
     """Serve the panel until SIGTERM or Ctrl-C; the arguments are those of :func:`serve`."""
 
     async def until_signal() -> None:

@@ -40,12 +40,12 @@ NO_ANSWER: Final = declared("The cell did not answer.")
 _LONGEST_S: Final = 20.0
 """Longest wait in s for the end of a look."""
 
-_AT_ONCE: Final = 2
+AT_ONCE: Final = 2
 """Number of looks at the same time: each is a process."""
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class CellLook:
     """What a look showed.
 
     Attributes:
@@ -128,20 +128,25 @@ class CellWatch:
         url: Its controller.
         every_s: How often it is looked at; ``None`` for only when a page is opened.
         changed: Called when there is something new to show.
+        slots: Taken for a look, of all cells together.
 
     Attributes:
         look: What was seen last; ``None`` before the first look.
         looking: Whether a look is under way.
     """
 
-    _slots: asyncio.Semaphore | None = None
-
     def __init__(
-        self, cell: str, url: str, every_s: float | None, changed: Callable[[], None]
+        self,
+        cell: str,
+        url: str,
+        every_s: float | None,
+        changed: Callable[[], None],
+        slots: asyncio.Semaphore,
     ) -> None:
         self.cell, self.url, self.every_s = cell, url, every_s
+        self._slots = slots
         self._changed = changed
-        self.look: Look | None = None
+        self.look: CellLook | None = None
         self.looking = False
 
     def is_due(self, now_s: float, *, wanted: bool) -> bool:
@@ -163,17 +168,15 @@ class CellWatch:
         if self.looking:
             return
         self.looking = True
-        if CellWatch._slots is None:
-            CellWatch._slots = asyncio.Semaphore(_AT_ONCE)
         try:
-            async with CellWatch._slots:
+            async with self._slots:
                 self.look = await _looked(self.cell)
         finally:
             self.looking = False
         self._changed()
 
 
-async def _looked(cell: str) -> Look:
+async def _looked(cell: str) -> CellLook:
     try:
         process = await asyncio.create_subprocess_exec(
             sys.executable,
@@ -181,7 +184,7 @@ async def _looked(cell: str) -> Look:
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
-            env={**os.environ, VARIABLE: ENGLISH},
+            env={**os.environ, VARIABLE: ENGLISH, "PYTHONIOENCODING": "utf-8"},
             start_new_session=os.name != "nt",
         )
         try:
@@ -189,14 +192,14 @@ async def _looked(cell: str) -> Look:
         except TimeoutError:
             process.kill()
             await process.wait()
-            return Look(time.monotonic(), wall_label(), failed=NO_ANSWER)
+            return CellLook(time.monotonic(), wall_label(), failed=NO_ANSWER)
         said = json.loads(out)
     except (OSError, ValueError) as error:
-        return Look(time.monotonic(), wall_label(), failed=str(error) or type(error).__name__)
+        return CellLook(time.monotonic(), wall_label(), failed=str(error) or type(error).__name__)
     now_s, at = time.monotonic(), wall_label()
     if "error" in said:
-        return Look(now_s, at, failed=str(said["error"].get("what", "")) or NO_ANSWER)
-    return Look(now_s, at, read=said)
+        return CellLook(now_s, at, failed=str(said["error"].get("what", "")) or NO_ANSWER)
+    return CellLook(now_s, at, read=said)
 
 
 def card_of(
@@ -238,7 +241,7 @@ def card_of(
     return replace(card, lines=(*lines, *said, *card.lines))
 
 
-def _mark(look: Look) -> str:
+def _mark(look: CellLook) -> str:
     read = look.read
     if any(read.get(flag) for flag in ("emergency_stop", "guard_open", "fault", "serious_fault")):
         return "bad"
@@ -247,7 +250,7 @@ def _mark(look: Look) -> str:
     return "ok"
 
 
-def _read(look: Look, now_s: float) -> tuple[str, ...]:
+def _read(look: CellLook, now_s: float) -> tuple[str, ...]:
     read, lines = look.read, list[str]()
     if read.get("held_by"):
         lines.append(tr("In use: {who}.", who=read["held_by"]))
@@ -260,9 +263,9 @@ def _read(look: Look, now_s: float) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _when(look: Look) -> str:
+def _when(look: CellLook) -> str:
     return tr("Last look: {time}.", time=_clock(look))
 
 
-def _clock(look: Look) -> str:
+def _clock(look: CellLook) -> str:
     return local_label(look.at)

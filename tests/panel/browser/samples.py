@@ -158,7 +158,7 @@ def _english():
             head("Touch 1 of 2", 4),
             TouchView(
                 ("Jog the tip onto the pin.",),
-                "Flange",
+                "Flange now",
                 (
                     CoordinateRow("X", "153.184", "-5.416"),
                     CoordinateRow("Y", "501.218", "+5.818"),
@@ -263,7 +263,7 @@ def _english():
                     "Jog the tip onto the pin again. robolink measures how far off it was.",
                     "Limit 0.200 mm. If it is off by more, robolink writes the old value back.",
                 ),
-                "Flange",
+                "Flange now",
                 (
                     CoordinateRow("X", "165.684", "+0.016"),
                     CoordinateRow("Y", "482.918", "-0.011"),

@@ -93,6 +93,23 @@ def test_a_finger_that_slides_off_presses_nothing(panel, page, fingers):
     assert still(panel) == []
 
 
+def test_a_finger_that_slides_over_a_page_leads_nowhere(panel, page, fingers):
+    """A browser takes it for Back where it may."""
+    panel.documents["/before"] = "<!DOCTYPE html><title>before</title>"
+    page.goto(panel.url.replace("/cell/line3", "/before"))
+    page.goto(panel.url)
+    alive(page)
+    for y in (60, 400, 760):
+        for start, end in ((200, 1200), (1200, 200), (640, 1270)):
+            fingers.down((start, y))
+            for step in range(1, 9):
+                fingers.move(start + (end - start) * step / 8, y)
+            fingers.up()
+    time.sleep(1.0)
+    assert page.url == panel.url
+    assert still(panel) == []
+
+
 def test_two_fingers_press_nothing(panel, page, fingers):
     fingers.down(TAKE)
     fingers.down("[data-action=leave]", 1)

@@ -17,7 +17,7 @@ const identity = () => Array.from(crypto.getRandomValues(new Uint8Array(12)), (b
 
 // The stream. Whatever is heard proves that it lives; a whole screen must have come by it too.
 let socket = null, begun = 0, ended = false, atMs = null, heard = -Infinity, fresh = false, silent = live, tries = 0;
-let number = Number(data.number), token = data.token, server = "", readAt = null, heardAt = null;
+let number = Number(data.number), token = data.token, server = "", readAt = null, lived = now(), heardAt = null;
 
 function connect() {
   const old = socket;
@@ -47,7 +47,6 @@ function send(frame) {
 
 function hear(frame) {
   heard = now();
-  heardAt = new Date();
   if (frame.t === "hello") {
     token = frame.token;
     if (server && server !== frame.server) renew();
@@ -56,7 +55,7 @@ function hear(frame) {
     put(frame);
     fresh = true;
   } else if (frame.t === "beat") {
-    atMs = typeof frame.at_ms === "number" ? frame.at_ms - now() : null;
+    atMs = typeof frame.at_ms === "number" ? {server: frame.at_ms, now: now(), date: Date.now()} : null;
     readAt = typeof frame.age_ms === "number" ? now() - frame.age_ms : null;
     if (document.visibilityState === "visible") send({t: "pong"});
   } else if (frame.t === "stopped") stopAnswered(frame);
@@ -88,12 +87,12 @@ function look() {
     silent = quiet > GREY_MS || !fresh;
     if (silent && held) release();
     page.classList.toggle("silent", silent);
-    const lost = silent && (heardAt !== null ? quiet > GREY_MS : now() > ANEW_MS);
+    if (!silent) { lived = heard; heardAt = new Date(Date.now() - quiet); }
+    const lost = silent && now() - lived > (heardAt ? GREY_MS : ANEW_MS);
     place("lost").hidden = !lost;
     if (lost) {
-      const since = heardAt === null ? now() : quiet;
-      say(place("lost").querySelector("[data-lost]"), {s: Math.floor(since / 1000)});
-      say(place("lost").querySelector("[data-heard]"), {at: heardAt ? heardAt.toLocaleTimeString(document.documentElement.lang) : "?"});
+      say(place("lost").querySelector("[data-lost]"), {s: Math.floor((now() - lived) / 1000)});
+      say(place("lost").querySelector("[data-heard]"), {at: heardAt ? heardAt.toLocaleTimeString("en-GB") : "?"});
       say(place("lost").querySelector("[data-tried]"), {n: tries});
     } else if (!silent) tries = 0;
     if ((quiet > ANEW_MS || ended) && now() - begun >= 1000) connect();
@@ -243,7 +242,7 @@ async function post({what, form}) {
   if (!answer.ok) {
     note(said.why, answer.status === 403 && !form);
     if (form) for (const input of form.querySelectorAll("[type=password]")) input.value = "";
-  } else if (form && form.dataset.onward) location.assign(form.dataset.onward);
+  } else if (form && form.dataset.onward) location.replace(form.dataset.onward);
   else if (what.then === "reload") location.reload();
 }
 
@@ -282,7 +281,10 @@ function release() {
 let latest = null;
 function stop() {
   const one = {press: identity(), begun: now(), done: false};
-  const at = atMs === null ? {} : {at_ms: Math.round(atMs + one.begun)}; // the press, by the clock of the server
+  // The press, by the clock of the server. In a tablet that slept one clock stood still, and one may be set anew:
+  // the longer time counts, so that no press of now is taken for an old one.
+  const since = atMs === null ? 0 : Math.max(one.begun - atMs.now, Date.now() - atMs.date);
+  const at = atMs === null ? {} : {at_ms: Math.round(atMs.server + since)};
   latest = one;
   place("stopped").hidden = true;
   place("stop").classList.add("down");

@@ -150,6 +150,30 @@ def test_a_check_of_a_cell_tells_its_findings(robot, tmp_path, monkeypatch):
     assert "line3" in lines_of(end)
 
 
+def test_a_job_that_was_refused_may_be_begun_again_from_its_last_screen(robot):
+    simulator, _, url = robot
+    numbers = []
+
+    def script(tablet):
+        simulator.machine.motors_on = False
+        end = tablet.body(EndView)
+        assert "otors" in lines_of(end)
+        numbers.append(tablet.view.number)
+        simulator.machine.motors_on = True
+        tablet.press("begin_again")
+        tablet.body(QuestionView)
+        numbers.append(tablet.view.number)
+        tablet.press("no")
+        tablet.body(EndView)
+        numbers.append(tablet.view.number)
+        tablet.press("leave")
+
+    simulator.machine.motors_on = False
+    code, _ = at_the_wire(["-c", url, "robot", "jog", "--keys"], script)
+    assert code == 9
+    assert numbers == sorted(set(numbers)), "no number comes twice"
+
+
 def test_nothing_more_is_asked_of_a_command_that_only_looks(robot):
     _, _, url = robot
     code, end, seen = through(["-c", url, "status"])

@@ -1,7 +1,5 @@
 """Other commands at the wire: what they ask becomes a view, what they print is their end."""
 
-from dataclasses import replace
-
 import pytest
 from robolink_cli import main
 from robolink_cli.wizard.views.records import (
@@ -127,17 +125,6 @@ def test_a_station_is_learnt_by_hand_at_the_wire(robot):
     assert (code, end.done) == (0, True), end
     assert "PIN-09" in lines_of(end)
     assert main.run(["-c", url, "cell", "station", "show", "PIN-09"]) == 0
-
-
-def test_a_tool_is_calibrated_by_hand_at_the_wire(robot):
-    simulator, _, url = robot
-    tip = simulator.world.tips[1]
-    simulator.world.tips[1] = replace(tip, x_mm=tip.x_mm + 0.31, y_mm=tip.y_mm - 0.22)
-    words = ["calibrate", "two-pose", "--tool", "1"]
-    code, end, seen = through(["-c", url, *words], eyes=InProcessEyes(simulator))
-    assert (code, end.done) == (0, True), end
-    assert any(isinstance(one, ValuesView) for one in seen)
-    assert "Tool 1" in lines_of(end)
 
 
 def test_a_check_of_a_cell_tells_its_findings(robot, tmp_path, monkeypatch):

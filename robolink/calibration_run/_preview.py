@@ -1,20 +1,21 @@
 """The preview of a nozzle change: every step with its target, before anything moves."""
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, cast
 
-from robolink.calibration import flange_of
+from robolink.calibration import flange_of, tip_pose
 from robolink.calibration_run._plan import (
     ChangePlan,
+    ToolPlan,
     journey,
     require_clearance,
     require_inputs,
     require_measurable,
     require_motion,
 )
-from robolink.errors import LimitError
+from robolink.errors import CalibrationError, ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model import (
     Controller,
@@ -25,14 +26,23 @@ from robolink.model import (
     Pose,
     ToolOffset,
 )
-from robolink.procedures import MovingSource
+from robolink.procedures import (
+    KeepsProof,
+    KeptProof,
+    LookSource,
+    MeasurementContext,
+    MovingSource,
+)
+from robolink.procedures.source_bases import InputSource
 from robolink.runner import (
     ArmAhead,
     Ask,
     ForeseenStep,
     Look,
     Move,
+    Operator,
     Procedure,
+    Rehearsal,
     RunSettings,
     Seek,
     TeachPrompt,
@@ -127,6 +137,98 @@ def foresee(
     """
     steps = foreseen_steps(procedure, here, consider=arm.considered if arm else nothing_in_the_way)
     return tuple(_planned_steps(steps, settings, arm))
+
+
+def rehearse(
+    controller: Controller,
+    plan: ChangePlan,
+    *,
+    here: Pose,
+    stored: Mapping[int, ToolOffset | None],
+    writes: bool = True,
+) -> Rehearsal | None:
+    """Go through a whole run as it will be if each tip is where its stored offset puts it.
+
+    Reads what the procedures want to know of the controller; nothing moves.
+
+    Args:
+        controller: The controller.
+        plan: The plan.
+        here: Where the flange is.
+        stored: The stored offset of each tool.
+        writes: Whether the tools are written, and their turn tests made.
+
+    Returns:
+        ``None`` where a procedure needs answers that nobody can expect.
+    """
+    rehearsal = Rehearsal(here)
+    context = MeasurementContext(
+        controller, cast(Operator, None), start=here, settings=plan.limits.settings
+    )
+    try:
+        rehearsal.run(journey(plan.safe, tr("Moving to the safe pose."), here))
+        proofs = [
+            proof
+            for one in plan.tools
+            if one.moving is not None
+            for proof in _rehearsed(rehearsal, context, one, one.moving, stored.get(one.tool))
+        ]
+        if writes:
+            for proof in proofs:
+                if not _prove(rehearsal, proof):
+                    return None
+        _back_to_flange(rehearsal)
+        if plan.safe is not None:
+            u_deg = plan.safe.u_deg if plan.turn_back else rehearsal.here.u_deg
+            goal = replace(plan.safe, u_deg=u_deg)
+            rehearsal.run(journey(goal, tr("Moving to the safe pose."), rehearsal.here))
+    except (CalibrationError, LimitError, ConfigError):
+        return None
+    return rehearsal
+
+
+def _rehearsed(
+    rehearsal: Rehearsal,
+    context: MeasurementContext,
+    plan: ToolPlan,
+    source: MovingSource,
+    stored: ToolOffset | None,
+) -> Iterator[KeptProof]:
+    """Go through the measurement of one tool, and yield its turn test."""
+    there = tr("Moving to the station for tool {tool}.", tool=plan.tool)
+    rehearsal.run(journey(plan.approach, there, rehearsal.here))
+    told = source.told_by(context) if isinstance(source, InputSource) else source
+    result = rehearsal.run(told.procedure(stored, rehearsal.here))
+    if isinstance(source, LookSource):
+        with source.opened() as camera:
+            rehearsal.settle_s = camera.settle_s
+    context.stands = rehearsal.here
+    away = tr("Leaving the station of tool {tool}.", tool=plan.tool)
+    rehearsal.run(journey(plan.retreat, away, rehearsal.here))
+    if plan.verify and isinstance(source, KeepsProof):
+        yield source.proof(
+            context,
+            plan.tool,
+            result,
+            tip=result.offset,
+            tolerance_mm=plan.criteria.drift_tolerance_mm,
+        )
+
+
+def _prove(rehearsal: Rehearsal, proof: KeptProof) -> bool:
+    """Go through a turn test, in the frame of the written tool; false if its steps are unknown."""
+    _back_to_flange(rehearsal)
+    frame = proof.written
+    rehearsal.select(tip_pose(rehearsal.here, frame, tool=proof.tool), frame)
+    steps = proof.foreseen(rehearsal.here)
+    if steps is not None:
+        rehearsal.run(steps)
+    return steps is not None
+
+
+def _back_to_flange(rehearsal: Rehearsal) -> None:
+    if rehearsal.frame != ToolOffset():
+        rehearsal.select(flange_of(rehearsal.here, rehearsal.frame), ToolOffset())
 
 
 def flange_now(controller: Controller) -> Pose:

@@ -1,6 +1,6 @@
 """One run of a recipe: preflight, then the nozzle change with what the recipe adds."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 from robolink.calibration_run._forecast import Forecast, RunForecaster, work_digest
 from robolink.calibration_run._nozzle_change import DescribeReport, NozzleChange
 from robolink.calibration_run._plan import ChangePlan, require_ready
-from robolink.calibration_run._preview import preview, require_inside
+from robolink.calibration_run._preview import PlannedStep, preview, rehearse, require_inside
 from robolink.calibration_run._proposal import ChangeReport, Listener
 from robolink.calibration_run._recipe_listener import RecipeListener
 from robolink.calibration_run._recipe_plan import Reference, find_reference, located, plan_of
 from robolink.config import Cell
+from robolink.controllers import JointRates
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import listed, tr
 from robolink.model import (
@@ -22,11 +23,12 @@ from robolink.model import (
     LookingController,
     PersonRole,
     TipSensor,
+    ToolOffset,
     says_it_is_simulated,
 )
 from robolink.recipe import Answers, beyond
 from robolink.remedy_words import RemedyWord, remedy_word
-from robolink.runner import Operator, RobotTime
+from robolink.runner import Operator, Rehearsal, RobotTime
 from robolink.stations import Station, find_stations, require_base_of, stations_on_record
 from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
 
@@ -140,6 +142,7 @@ class RecipeRun:
         self.forecast: Forecast | None = None
         self.robot_s: float | None = None
         self._of_file = loaded.recipe
+        self._rates = _rates(cell)
         self._other_sensor = sensor if isinstance(sensor, str) else "" if sensor is None else "own"
         self._ahead: RunForecaster | None = None
 
@@ -199,8 +202,20 @@ class RecipeRun:
             work_digest(self._of_file, self.plan, version=version),
             self.plan,
             steps,
+            partial(self._rehearsed, stored, steps),
+            self._rates,
         )
         self.forecast = self._ahead.forecast()
+
+    def _rehearsed(
+        self, stored: Mapping[int, ToolOffset | None], steps: Sequence[PlannedStep]
+    ) -> Rehearsal | None:
+        """Go through the run as it will be if the tips are where they are expected."""
+        here = next((one.start for one in steps if one.start is not None), None)
+        if here is None:
+            return None
+        writes = not (self.takes_reference or self._measure_only)
+        return rehearse(self._controller, self.plan, here=here, stored=stored, writes=writes)
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
         """Ask for the ids of nozzles and lots before anything moves; yield each.
@@ -326,6 +341,13 @@ class RecipeRun:
                     accept_jump=remedy_word(RemedyWord.ACCEPT_JUMP),
                 ),
             )
+
+
+def _rates(cell: Cell | None) -> JointRates | None:
+    """Return how fast the joints are, where the cell file says it."""
+    if cell is None or cell.settings.joint_speeds is None:
+        return None
+    return JointRates(cell.settings.joint_speeds, cell.settings.joint_accelerations or ())
 
 
 def _require_cell(loaded: "LoadedRecipe", cell: Cell | None) -> None:

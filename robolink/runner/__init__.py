@@ -41,6 +41,13 @@ from robolink.runner._prompt_context import (
     awaited_line,
     regard,
 )
+from robolink.runner._rehearsal import (
+    ForeseesMovements,
+    Rehearsal,
+    RehearsedKind,
+    RehearsedStep,
+    RehearsedTime,
+)
 from robolink.runner._robot_time import RobotTime, TimedMove, TimeShare, way_between
 from robolink.runner._runner import EndingWatch, Runner, ask_for_pose
 from robolink.runner._steps import (
@@ -78,6 +85,7 @@ __all__ = [
     "FitRow",
     "FitSubject",
     "ForeseenStep",
+    "ForeseesMovements",
     "GuidedOperator",
     "JogRange",
     "JogSubject",
@@ -93,6 +101,10 @@ __all__ = [
     "POLL_S",
     "Procedure",
     "Question",
+    "Rehearsal",
+    "RehearsedKind",
+    "RehearsedStep",
+    "RehearsedTime",
     "RobotTime",
     "RunSettings",
     "Runner",

@@ -331,11 +331,9 @@ class RunForecaster:
 
     def _calculated(self, runs: Sequence[RunTimes]) -> RehearsedTime | None:
         """Return how long the run takes by its movements; ``None`` where nobody can tell."""
-        group = self.controller.groups[0]
-        if not isinstance(group, ForeseesMovements):
-            return None
         rehearsal = self.rehearse()
-        if rehearsal is None:
+        group = self.controller.groups[0] if rehearsal is not None else None
+        if rehearsal is None or not isinstance(group, ForeseesMovements):
             return None
         try:
             times = group.movement_times(self.rates)

@@ -1,9 +1,10 @@
 """The preview of a nozzle change: every step with its target, before anything moves."""
 
+import math
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar, cast
+from typing import ClassVar, Final, Protocol, cast, runtime_checkable
 
 from robolink.calibration import flange_of, tip_pose
 from robolink.calibration_run._plan import (
@@ -43,6 +44,7 @@ from robolink.runner import (
     Operator,
     Procedure,
     Rehearsal,
+    RehearsedStep,
     RunSettings,
     Seek,
     TeachPrompt,
@@ -254,6 +256,99 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
                 ),
                 controller=controller.identity,
             )
+
+
+@runtime_checkable
+class TellsReach(Protocol):
+    """A group whose controller tells whether the arm gets to a place."""
+
+    def reaches(self, target: Pose) -> bool:
+        """Read whether the frame of the selected tool can be there.
+
+        Args:
+            target: Where.
+        """
+
+
+def require_turn_test(controller: Controller, plan: ChangePlan, rehearsal: Rehearsal) -> None:
+    """Refuse a turn test that could be made with no tip that this change may find; only reads.
+
+    The new tip is not where the stored offset puts it, but not farther from there than the largest
+    change that is believed. So what the arm does not reach with the stored offset is asked for
+    other tips on that circle too, and a place outside the box must be outside by more than that.
+
+    Args:
+        controller: The controller.
+        plan: The plan.
+        rehearsal: The run, gone through with each tip where it is expected.
+
+    Raises:
+        LimitError: Names the step; nothing moved.
+    """
+    turning = [step for step in rehearsal.steps if step.frame != ToolOffset() and step.goes]
+    slack_mm = max(one.criteria.max_change_mm for one in plan.tools)
+    refusals = ((step, _outside(plan, rehearsal.began, step, slack_mm)) for step in turning)
+    step, refusal = next((one for one in refusals if one[1]), (None, ""))
+    if step is None:
+        step = _out_of_reach(controller, turning, slack_mm)
+        refusal = tr("The robot cannot reach that place with its tool turned that way.")
+    if step is not None:
+        raise LimitError(
+            tr("Turn test: {step} {refusal}", step=step.purpose, refusal=refusal),
+            remedy=tr(
+                "Nothing moved. Let the turn test turn the tool another way, or move the "
+                "station to where the arm has room to turn it."
+            ),
+            controller=controller.identity,
+        )
+
+
+_DIRECTIONS: Final = 12
+"""Number of tips around the expected one for which the arm is asked."""
+
+
+def _outside(plan: ChangePlan, start: Pose, step: RehearsedStep, slack_mm: float) -> str:
+    """Return why the box forbids a step of the turn test, empty if it does not."""
+    box = plan.limits.settings(start, step.frame).box
+    try:
+        box.larger(sideways_mm=slack_mm, up_mm=slack_mm, down_mm=slack_mm).check(step.farthest)
+    except LimitError as error:
+        return error.what
+    return ""
+
+
+def _out_of_reach(
+    controller: Controller, steps: Sequence[RehearsedStep], slack_mm: float
+) -> RehearsedStep | None:
+    """Return the first step that the arm cannot make, if no tip within reach lets it make all."""
+    group = controller.groups[0]
+    if not steps or not isinstance(group, TellsReach):
+        return None
+    arm, refused, first = ArmAhead.of(controller), list[RehearsedStep](), None
+    for dx_mm, dy_mm in _tips_about(slack_mm):
+        asked = set[tuple[float, ...]]()
+        for step in (*refused, *steps):
+            tip = replace(step.frame, x_mm=step.frame.x_mm + dx_mm, y_mm=step.frame.y_mm + dy_mm)
+            flange = flange_of(step.farthest, tip)
+            place = tuple(round(at, 3) for at in flange.coordinates())
+            if place in asked:
+                continue
+            asked.add(place)
+            if not group.reaches(arm.tip(flange)):
+                # What one tip cannot reach is asked first for the next.
+                refused, first = [step], first or step
+                break
+        else:
+            return None
+    return first
+
+
+def _tips_about(by_mm: float) -> Iterator[tuple[float, float]]:
+    """Yield by how much a tip may be beside the expected one, which is the first."""
+    yield 0.0, 0.0
+    for number in range(_DIRECTIONS):
+        angle = math.tau * number / _DIRECTIONS
+        yield by_mm * math.cos(angle), by_mm * math.sin(angle)
 
 
 def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 from robolink.calibration_run._forecast import Forecast, RunForecaster, work_digest
 from robolink.calibration_run._nozzle_change import DescribeReport, NozzleChange
 from robolink.calibration_run._plan import ChangePlan, require_ready
-from robolink.calibration_run._preview import PlannedStep, preview, rehearse, require_inside
+from robolink.calibration_run._preview import (
+    PlannedStep,
+    preview,
+    rehearse,
+    require_inside,
+    require_turn_test,
+)
 from robolink.calibration_run._proposal import ChangeReport, Listener
 from robolink.calibration_run._recipe_listener import RecipeListener
 from robolink.calibration_run._recipe_plan import Reference, find_reference, located, plan_of
@@ -153,7 +159,8 @@ class RecipeRun:
             CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
             ConfigError: The recipe's numbers are those of a simulated cell, and this is none.
             ConnectError: A camera is not there.
-            LimitError: A foreseen target lies outside the box.
+            LimitError: A foreseen target lies outside the box, or the arm cannot turn the tool for
+                the turn test.
             NotReadyError: The station was learnt in another base.
             NotAllowedError: A jump is accepted by somebody who is no engineer.
             OutcomeUnknownError: An earlier job is unfinished.
@@ -210,12 +217,19 @@ class RecipeRun:
     def _rehearsed(
         self, stored: Mapping[int, ToolOffset | None], steps: Sequence[PlannedStep]
     ) -> Rehearsal | None:
-        """Go through the run as it will be if the tips are where they are expected."""
+        """Go through the run as it will be if the tips are where they are expected.
+
+        Raises:
+            LimitError: The turn test cannot be made, whatever is measured.
+        """
         here = next((one.start for one in steps if one.start is not None), None)
         if here is None:
             return None
         writes = not (self.takes_reference or self._measure_only)
-        return rehearse(self._controller, self.plan, here=here, stored=stored, writes=writes)
+        gone = rehearse(self._controller, self.plan, here=here, stored=stored, writes=writes)
+        if gone is not None:
+            require_turn_test(self._controller, self.plan, gone)
+        return gone
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
         """Ask for the ids of nozzles and lots before anything moves; yield each.

@@ -56,8 +56,8 @@ class RehearsedStep:
         frame: That frame, seen from the flange.
         path: How it goes.
         speed_mm_s: How fast a search goes; ``None`` for the speed of the run.
-        pictures: How many are taken in a look.
         purpose: What for, for a person.
+        target: Where a search ends at the latest; ``None`` where it is no search.
     """
 
     kind: RehearsedKind
@@ -66,8 +66,18 @@ class RehearsedStep:
     frame: ToolOffset
     path: Path = Path.STRAIGHT
     speed_mm_s: float | None = None
-    pictures: int = 0
     purpose: str = ""
+    target: Pose | None = None
+
+    @property
+    def goes(self) -> bool:
+        """Whether the frame moves in it."""
+        return self.kind in (RehearsedKind.MOVE, RehearsedKind.SEARCH)
+
+    @property
+    def farthest(self) -> Pose:
+        """How far the frame may go."""
+        return self.target or self.end
 
     def way(self, speeds: MotionProfile) -> Way:
         """Return the way of a movement.
@@ -117,6 +127,7 @@ class Rehearsal:
         here: Where the flange is.
 
     Attributes:
+        began: Where the flange was at first.
         here: Where the frame that moves is.
         frame: That frame, seen from the flange.
         steps: What the robot will do.
@@ -134,7 +145,7 @@ class Rehearsal:
     """
 
     def __init__(self, here: Pose) -> None:
-        self.here = here
+        self.here = self.began = here
         self.steps: list[RehearsedStep] = []
         self.settle_s = 0.0
         self.frame = ToolOffset()
@@ -221,7 +232,7 @@ class Rehearsal:
             case Confirm():
                 return False
             case Look():
-                self._did(RehearsedKind.LOOK, self.here, step.purpose, pictures=step.pictures)
+                self._did(RehearsedKind.LOOK, self.here, step.purpose)
                 return SeenAt.of(self.here, *_seen(step))
             case Ask():
                 self.here = step.foreseen or self.here
@@ -230,8 +241,13 @@ class Rehearsal:
             case Move():
                 self._did(RehearsedKind.MOVE, step.target, step.purpose, path=step.path)
             case Seek():
-                end = step.expected or step.target
-                self._did(RehearsedKind.SEARCH, end, step.purpose, speed_mm_s=step.speed_mm_s)
+                self._did(
+                    RehearsedKind.SEARCH,
+                    step.expected or step.target,
+                    step.purpose,
+                    speed_mm_s=step.speed_mm_s,
+                    target=step.target,
+                )
         return self.here
 
     def _did(
@@ -242,10 +258,10 @@ class Rehearsal:
         *,
         path: Path = Path.STRAIGHT,
         speed_mm_s: float | None = None,
-        pictures: int = 0,
+        target: Pose | None = None,
     ) -> None:
         self.steps.append(
-            RehearsedStep(kind, self.here, end, self.frame, path, speed_mm_s, pictures, purpose)
+            RehearsedStep(kind, self.here, end, self.frame, path, speed_mm_s, purpose, target)
         )
         self.here = end
 

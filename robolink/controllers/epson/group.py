@@ -121,6 +121,16 @@ class EpsonGroup(MotionGroupCore):
         begin = None if start is None else self._flagged(start)
         return singular.obstacle(self._flagged(target), path, begin)
 
+    def reaches(self, target: Pose) -> bool:
+        """Read whether the frame of the selected tool can be somewhere (TargetOK).
+
+        Args:
+            target: Where; nothing moves.
+        """
+        query = spel.print_reachable(self._flagged(target), six_axes=self._six_axes)
+        with self._link.window.proving_ready(query):
+            return spel.parse_boolean(self._link.window.printed(query))
+
     def deceleration_mm_s2(self) -> float:
         """Read AccelS, or less where the cell states it: ``Till`` brakes with it.
 

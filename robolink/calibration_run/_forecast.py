@@ -184,8 +184,8 @@ class Forecast:
         """The same for a person."""
         if self.about_s is not None and self.left_out:
             return tr(
-                "The robot needs about {seconds} s, not counting {count} moves whose speed is not "
-                "known and what you do yourself.",
+                "The robot needs about {seconds} s, not counting moves of unknown speed ({count}) "
+                "and what you do yourself.",
                 seconds=_rounded(self.about_s),
                 count=self.left_out,
             )

@@ -248,14 +248,19 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
     """
     for step in steps:
         if step.refusal:
-            raise LimitError(
-                tr("{step} {refusal}", step=step.text, refusal=step.refusal),
-                remedy=tr(
-                    "Jog the tip closer to the station, or widen the allowed area. If the arm "
-                    "cannot reach: move the station."
-                ),
-                controller=controller.identity,
-            )
+            what = tr("{step} {refusal}", step=step.text, refusal=step.refusal)
+            raise _refused(controller, what)
+
+
+def _refused(controller: Controller, what: str) -> LimitError:
+    return LimitError(
+        what,
+        remedy=tr(
+            "Jog the tip closer to the station, or widen the allowed area. If the arm "
+            "cannot reach: move the station."
+        ),
+        controller=controller.identity,
+    )
 
 
 @runtime_checkable
@@ -287,20 +292,24 @@ def require_turn_test(controller: Controller, plan: ChangePlan, rehearsal: Rehea
     """
     turning = [step for step in rehearsal.steps if step.frame != ToolOffset() and step.goes]
     slack_mm = max(one.criteria.max_change_mm for one in plan.tools)
-    refusals = ((step, _outside(plan, rehearsal.began, step, slack_mm)) for step in turning)
-    step, refusal = next((one for one in refusals if one[1]), (None, ""))
-    if step is None:
-        step = _out_of_reach(controller, turning, slack_mm)
-        refusal = tr("The robot cannot reach that place with its tool turned that way.")
-    if step is not None:
+    for step in turning:
+        if refusal := _outside(plan, rehearsal.began, step, slack_mm):
+            raise _refused(controller, _turn_test(step, refusal))
+    if step := _out_of_reach(controller, turning, slack_mm):
         raise LimitError(
-            tr("Turn test: {step} {refusal}", step=step.purpose, refusal=refusal),
+            _turn_test(
+                step, tr("The robot cannot reach that place with its tool turned that way.")
+            ),
             remedy=tr(
                 "Nothing moved. Let the turn test turn the tool another way, or move the "
                 "station to where the arm has room to turn it."
             ),
             controller=controller.identity,
         )
+
+
+def _turn_test(step: RehearsedStep, refusal: str) -> str:
+    return tr("Turn test: {step} {refusal}", step=step.purpose, refusal=refusal)
 
 
 _DIRECTIONS: Final = 12

@@ -404,6 +404,11 @@ def _like_s(
         longest_mm, seconds = max(lengths)
         along_s = seconds + (length_mm - longest_mm) / speed_mm_s
     around_s = _between(turns, turn_deg, _ALIKE_DEG)
+    if along_s is None and around_s is not None:
+        # A way as long that took no longer than this turn shows that the turn takes longer.
+        most_s = around_s * (1 + _ALIKE)
+        shown = (mm * (1 + _ALIKE) >= length_mm and seconds <= most_s for mm, _, seconds in own)
+        along_s = 0.0 if any(shown) else None
     return None if along_s is None or around_s is None else max(along_s, around_s)
 
 

@@ -9,6 +9,7 @@ from typing import ClassVar, Final, Protocol, cast, runtime_checkable
 from robolink.calibration import flange_of, tip_pose
 from robolink.calibration_run._plan import (
     ChangePlan,
+    Proposals,
     ToolPlan,
     journey,
     require_clearance,
@@ -290,22 +291,60 @@ def require_turn_test(controller: Controller, plan: ChangePlan, rehearsal: Rehea
     Raises:
         LimitError: Names the step; nothing moved.
     """
-    turning = [step for step in rehearsal.steps if step.frame != ToolOffset() and step.goes]
     slack_mm = max(one.criteria.max_change_mm for one in plan.tools)
+    remedy = tr(
+        "Nothing moved. Let the turn test turn the tool another way, or move the "
+        "station to where the arm has room to turn it."
+    )
+    _require_made(controller, plan, rehearsal, slack_mm, remedy)
+
+
+def require_proofs(
+    controller: Controller, plan: ChangePlan, context: MeasurementContext, proposals: Proposals
+) -> None:
+    """Refuse to write what the turn test could not prove, now that the tips are known; only reads.
+
+    Args:
+        controller: The controller.
+        plan: The plan.
+        context: What the sources work with.
+        proposals: What would be written.
+
+    Raises:
+        LimitError: Names the step; nothing was written.
+    """
+    rehearsal = Rehearsal(flange_now(controller))
+    try:
+        for one, proposal in proposals:
+            source, tolerance_mm = one.source, one.criteria.drift_tolerance_mm
+            if not one.verify or not isinstance(source, KeepsProof):
+                continue
+            result, tip = proposal.result, proposal.tip
+            proof = source.proof(context, one.tool, result, tip=tip, tolerance_mm=tolerance_mm)
+            if not _prove(rehearsal, proof):
+                return
+    except CalibrationError:
+        return  # the test itself decides
+    rehearsal.began = context.start or rehearsal.began
+    remedy = tr(
+        "Nothing was written. Let the turn test turn the tool another way, or move the "
+        "station to where the arm has room to turn it."
+    )
+    _require_made(controller, plan, rehearsal, 0.0, remedy)
+
+
+def _require_made(
+    controller: Controller, plan: ChangePlan, rehearsal: Rehearsal, slack_mm: float, remedy: str
+) -> None:
+    """Refuse turn tests that cannot be made with the tips so far beside their places."""
+    turning = [step for step in rehearsal.steps if step.frame != ToolOffset() and step.goes]
     for step in turning:
         if refusal := _outside(plan, rehearsal.began, step, slack_mm):
             raise _refused(controller, _turn_test(step, refusal))
-    if step := _out_of_reach(controller, turning, slack_mm):
-        raise LimitError(
-            _turn_test(
-                step, tr("The robot cannot reach that place with its tool turned that way.")
-            ),
-            remedy=tr(
-                "Nothing moved. Let the turn test turn the tool another way, or move the "
-                "station to where the arm has room to turn it."
-            ),
-            controller=controller.identity,
-        )
+    far = _out_of_reach(controller, turning, slack_mm)
+    if far is not None:
+        refusal = tr("The robot cannot reach that place with its tool turned that way.")
+        raise LimitError(_turn_test(far, refusal), remedy=remedy, controller=controller.identity)
 
 
 def _turn_test(step: RehearsedStep, refusal: str) -> str:
@@ -355,7 +394,7 @@ def _out_of_reach(
 def _tips_about(by_mm: float) -> Iterator[tuple[float, float]]:
     """Yield by how much a tip may be beside the expected one, which is the first."""
     yield 0.0, 0.0
-    for number in range(_DIRECTIONS):
+    for number in range(_DIRECTIONS if by_mm else 0):
         angle = math.tau * number / _DIRECTIONS
         yield by_mm * math.cos(angle), by_mm * math.sin(angle)
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from robolink.calibration_run._forecast import Forecast, RunForecaster, work_digest
 from robolink.calibration_run._nozzle_change import DescribeReport, NozzleChange
-from robolink.calibration_run._plan import ChangePlan, require_ready
+from robolink.calibration_run._plan import ChangePlan, Proposals, require_ready
 from robolink.calibration_run._preview import (
     PlannedStep,
     preview,
     rehearse,
     require_inside,
+    require_proofs,
     require_turn_test,
 )
 from robolink.calibration_run._proposal import ChangeReport, Listener
@@ -32,6 +33,7 @@ from robolink.model import (
     ToolOffset,
     says_it_is_simulated,
 )
+from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, beyond
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import Operator, Rehearsal, RobotTime
@@ -149,6 +151,7 @@ class RecipeRun:
         self.robot_s: float | None = None
         self._of_file = loaded.recipe
         self._rates = _rates(cell)
+        self._before_write: Callable[[MeasurementContext, Proposals], None] | None = None
         self._other_sensor = sensor if isinstance(sensor, str) else "" if sensor is None else "own"
         self._ahead: RunForecaster | None = None
 
@@ -227,8 +230,10 @@ class RecipeRun:
             return None
         writes = not (self.takes_reference or self._measure_only)
         gone = rehearse(self._controller, self.plan, here=here, stored=stored, writes=writes)
-        if gone is not None:
+        if gone is not None and writes:
             require_turn_test(self._controller, self.plan, gone)
+            # No run like this one has shown it: asked once more, for the tips that are found.
+            self._before_write = partial(require_proofs, self._controller, self.plan)
         return gone
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
@@ -297,6 +302,7 @@ class RecipeRun:
             order=self._order,
             describe=self._describe,
             robot_time=time,
+            before_write=self._before_write,
         )
 
     @contextmanager

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass
 from itertools import islice
 from statistics import median
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from robolink.calibration_run._plan import ChangePlan
 from robolink.calibration_run._preview import PlannedStep
@@ -170,6 +170,8 @@ class Forecast:
         answer_s: How long the controller takes to answer; ``None`` where nobody knows.
         left_out: How many movements are not in it, because nobody knows how fast they are.
     """
+
+    json_version: ClassVar[int] = 2
 
     about_s: float | None
     straight_s: float

@@ -18,7 +18,7 @@ from robolink.calibration_run._plan import (
     require_motion,
 )
 from robolink.errors import CalibrationError, ConfigError, LimitError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import (
     Controller,
     InputEdge,
@@ -292,11 +292,7 @@ def require_turn_test(controller: Controller, plan: ChangePlan, rehearsal: Rehea
         LimitError: Names the step; nothing moved.
     """
     slack_mm = max(one.criteria.max_change_mm for one in plan.tools)
-    remedy = tr(
-        "Nothing moved. Let the turn test turn the tool another way, or move the "
-        "station to where the arm has room to turn it."
-    )
-    _require_made(controller, plan, rehearsal, slack_mm, remedy)
+    _require_made(controller, plan, rehearsal, slack_mm, tr("Nothing moved."))
 
 
 def require_proofs(
@@ -326,15 +322,11 @@ def require_proofs(
     except CalibrationError:
         return  # the test itself decides
     rehearsal.began = context.start or rehearsal.began
-    remedy = tr(
-        "Nothing was written. Let the turn test turn the tool another way, or move the "
-        "station to where the arm has room to turn it."
-    )
-    _require_made(controller, plan, rehearsal, 0.0, remedy)
+    _require_made(controller, plan, rehearsal, 0.0, tr("Nothing was written."))
 
 
 def _require_made(
-    controller: Controller, plan: ChangePlan, rehearsal: Rehearsal, slack_mm: float, remedy: str
+    controller: Controller, plan: ChangePlan, rehearsal: Rehearsal, slack_mm: float, stands: str
 ) -> None:
     """Refuse turn tests that cannot be made with the tips so far beside their places."""
     turning = [step for step in rehearsal.steps if step.frame != ToolOffset() and step.goes]
@@ -344,7 +336,15 @@ def _require_made(
     far = _out_of_reach(controller, turning, slack_mm)
     if far is not None:
         refusal = tr("The robot cannot reach that place with its tool turned that way.")
-        raise LimitError(_turn_test(far, refusal), remedy=remedy, controller=controller.identity)
+        remedy = tr(
+            "Let the turn test turn the tool another way, or move the station to where the arm has "
+            "room to turn it."
+        )
+        raise LimitError(
+            _turn_test(far, refusal),
+            remedy=joined(" ", (stands, remedy)),
+            controller=controller.identity,
+        )
 
 
 def _turn_test(step: RehearsedStep, refusal: str) -> str:
@@ -357,9 +357,9 @@ _DIRECTIONS: Final = 12
 
 def _outside(plan: ChangePlan, start: Pose, step: RehearsedStep, slack_mm: float) -> str:
     """Return why the box forbids a step of the turn test, empty if it does not."""
-    box = plan.limits.settings(start, step.frame).box
+    box = plan.limits.settings(start, step.frame).box.larger(sideways_mm=slack_mm, up_mm=slack_mm)
     try:
-        box.larger(sideways_mm=slack_mm, up_mm=slack_mm, down_mm=slack_mm).check(step.farthest)
+        replace(box, z_min_mm=box.z_min_mm - slack_mm).check(step.farthest)
     except LimitError as error:
         return error.what
     return ""

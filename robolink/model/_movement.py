@@ -195,16 +195,14 @@ class WorkBox:
             pose.z_mm + self.z_max_mm,
         )
 
-    def larger(
-        self, *, sideways_mm: float = 0.0, up_mm: float = 0.0, down_mm: float = 0.0
-    ) -> "WorkBox":
-        """Return the box enlarged by so much, to all sides, up and down."""
+    def larger(self, *, sideways_mm: float = 0.0, up_mm: float = 0.0) -> "WorkBox":
+        """Return the box enlarged by so much, to all sides and up."""
         return WorkBox(
             self.x_min_mm - sideways_mm,
             self.x_max_mm + sideways_mm,
             self.y_min_mm - sideways_mm,
             self.y_max_mm + sideways_mm,
-            self.z_min_mm - down_mm,
+            self.z_min_mm,
             self.z_max_mm + up_mm,
         )
 

@@ -202,6 +202,17 @@ class Rehearsal:
             tools: How many tools are measured.
             otherwise: Tells the seconds of what ``times`` does not know, by the path and by how far
                 the frame goes, in mm and degrees.
+
+        Example:
+            >>> from robolink.controllers.epson.arms import EpsonTimes
+            >>> from robolink.model import MotionProfile, Pose
+            >>> from robolink.procedures import approach_path
+            >>> from robolink.runner import Rehearsal
+            >>> rehearsal, above = Rehearsal(Pose(300, 100, 0, 0)), Pose(300, 100, 50, 0)
+            >>> rehearsal.run(approach_path(above, here=rehearsal.here, purpose="Lifting."))
+            >>> unknown_arm = EpsonTimes((200, 200), (10, 10), 100, None)
+            >>> rehearsal.takes(unknown_arm, MotionProfile(speed_mm_s=50), tools=1).seconds
+            1.25
         """
         counts = times.answers
         seconds, answers, left_out = 0.0, counts.run + tools * counts.tool, 0

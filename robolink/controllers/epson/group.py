@@ -153,7 +153,7 @@ class EpsonGroup(MotionGroupCore):
             stated: How fast the joints are at Speed 100 and Accel 100, by the cell file; ``None``
                 for what is known of the robot's model.
         """
-        from robolink.controllers.epson.arms import read_times  # a stop does without it
+        from robolink.controllers.epson.arms.times import read_times  # a stop does without it
 
         accel_s = self.settings.acceleration_mm_s2()
         return read_times(self._link, accel_s, stated)

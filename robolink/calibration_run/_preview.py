@@ -1,10 +1,9 @@
 """The preview of a nozzle change: every step with its target, before anything moves."""
 
-import math
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar, Final, Protocol, cast, runtime_checkable
+from typing import ClassVar, Final, cast
 
 from robolink.calibration import flange_of, tip_pose
 from robolink.calibration_run._plan import (
@@ -17,7 +16,7 @@ from robolink.calibration_run._plan import (
     require_measurable,
     require_motion,
 )
-from robolink.errors import CalibrationError, ConfigError, LimitError
+from robolink.errors import CalibrationError, ConfigError, ConnectError, LimitError
 from robolink.messages import joined, tr
 from robolink.model import (
     Controller,
@@ -185,9 +184,22 @@ def rehearse(
             u_deg = plan.safe.u_deg if plan.turn_back else rehearsal.here.u_deg
             goal = replace(plan.safe, u_deg=u_deg)
             rehearsal.run(journey(goal, tr("Moving to the safe pose."), rehearsal.here))
-    except (CalibrationError, LimitError, ConfigError):
+    except _NOTHING_MADE_OF_IT:
         return None
     return rehearsal
+
+
+_NOTHING_MADE_OF_IT: Final = (
+    CalibrationError,
+    LimitError,
+    ConfigError,
+    ConnectError,
+    ArithmeticError,
+    TypeError,
+    ValueError,
+)
+"""What a procedure, perhaps of another package, may raise at answers that only are expected; the
+run itself does not depend on them."""
 
 
 def _rehearsed(
@@ -264,18 +276,6 @@ def _refused(controller: Controller, what: str) -> LimitError:
     )
 
 
-@runtime_checkable
-class TellsReach(Protocol):
-    """A group whose controller tells whether the arm gets to a place."""
-
-    def reaches(self, target: Pose) -> bool:
-        """Read whether the frame of the selected tool can be there.
-
-        Args:
-            target: Where.
-        """
-
-
 def require_turn_test(controller: Controller, plan: ChangePlan, rehearsal: Rehearsal) -> None:
     """Refuse a turn test that could be made with no tip that this change may find; only reads.
 
@@ -319,7 +319,7 @@ def require_proofs(
             proof = source.proof(context, one.tool, result, tip=tip, tolerance_mm=tolerance_mm)
             if not _prove(rehearsal, proof):
                 return
-    except CalibrationError:
+    except _NOTHING_MADE_OF_IT:
         return  # the test itself decides
     rehearsal.began = context.start or rehearsal.began
     _require_made(controller, plan, rehearsal, 0.0, tr("Nothing was written."))
@@ -329,11 +329,10 @@ def _require_made(
     controller: Controller, plan: ChangePlan, rehearsal: Rehearsal, slack_mm: float, stands: str
 ) -> None:
     """Refuse turn tests that cannot be made with the tips so far beside their places."""
-    turning = [step for step in rehearsal.steps if step.frame != ToolOffset() and step.goes]
-    for step in turning:
+    for step in rehearsal.turning:
         if refusal := _outside(plan, rehearsal.began, step, slack_mm):
             raise _refused(controller, _turn_test(step, refusal))
-    far = _out_of_reach(controller, turning, slack_mm)
+    far = rehearsal.beyond_reach(controller, slack_mm)
     if far is not None:
         refusal = tr("The robot cannot reach that place with its tool turned that way.")
         remedy = tr(
@@ -351,10 +350,6 @@ def _turn_test(step: RehearsedStep, refusal: str) -> str:
     return tr("Turn test: {step} {refusal}", step=step.purpose, refusal=refusal)
 
 
-_DIRECTIONS: Final = 12
-"""Number of tips around the expected one for which the arm is asked."""
-
-
 def _outside(plan: ChangePlan, start: Pose, step: RehearsedStep, slack_mm: float) -> str:
     """Return why the box forbids a step of the turn test, empty if it does not."""
     box = plan.limits.settings(start, step.frame).box.larger(sideways_mm=slack_mm, up_mm=slack_mm)
@@ -363,40 +358,6 @@ def _outside(plan: ChangePlan, start: Pose, step: RehearsedStep, slack_mm: float
     except LimitError as error:
         return error.what
     return ""
-
-
-def _out_of_reach(
-    controller: Controller, steps: Sequence[RehearsedStep], slack_mm: float
-) -> RehearsedStep | None:
-    """Return the first step that the arm cannot make, if no tip within reach lets it make all."""
-    group = controller.groups[0]
-    if not steps or not isinstance(group, TellsReach):
-        return None
-    arm, refused, first = ArmAhead.of(controller), list[RehearsedStep](), None
-    for dx_mm, dy_mm in _tips_about(slack_mm):
-        asked = set[tuple[float, ...]]()
-        for step in (*refused, *steps):
-            tip = replace(step.frame, x_mm=step.frame.x_mm + dx_mm, y_mm=step.frame.y_mm + dy_mm)
-            flange = flange_of(step.farthest, tip)
-            place = tuple(round(at, 3) for at in flange.coordinates())
-            if place in asked:
-                continue
-            asked.add(place)
-            if not group.reaches(arm.tip(flange)):
-                # What one tip cannot reach is asked first for the next.
-                refused, first = [step], first or step
-                break
-        else:
-            return None
-    return first
-
-
-def _tips_about(by_mm: float) -> Iterator[tuple[float, float]]:
-    """Yield by how much a tip may be beside the expected one, which is the first."""
-    yield 0.0, 0.0
-    for number in range(_DIRECTIONS if by_mm else 0):
-        angle = math.tau * number / _DIRECTIONS
-        yield by_mm * math.cos(angle), by_mm * math.sin(angle)
 
 
 def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:

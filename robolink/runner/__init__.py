@@ -47,6 +47,7 @@ from robolink.runner._rehearsal import (
     RehearsedKind,
     RehearsedStep,
     RehearsedTime,
+    TellsReach,
 )
 from robolink.runner._robot_time import RobotTime, TimedMove, TimeShare, way_between
 from robolink.runner._runner import EndingWatch, Runner, ask_for_pose
@@ -118,6 +119,7 @@ __all__ = [
     "TeachPrompt",
     "TimeShare",
     "TimedMove",
+    "TellsReach",
     "TouchSubject",
     "TouchedAt",
     "ask_for_pose",

@@ -6,15 +6,16 @@ depends on that. So here each step is answered with what is expected of it, and 
 mathematics decides how it continues. Nothing moves, and nobody is asked.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final, Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import flange_of
 from robolink.controllers import JointRates, MovementTimes, Way
-from robolink.model import MotionProfile, Path, Pose, Spot, SpotUnit, ToolOffset
-from robolink.runner._dry_run import nothing_in_the_way
+from robolink.model import Controller, MotionProfile, Path, Pose, Spot, SpotUnit, ToolOffset
+from robolink.runner._dry_run import ArmAhead, nothing_in_the_way
 from robolink.runner._robot_time import way_between
 from robolink.runner._steps import (
     Ask,
@@ -57,7 +58,7 @@ class RehearsedStep:
         path: How it goes.
         speed_mm_s: How fast a search goes; ``None`` for the speed of the run.
         purpose: What for, for a person.
-        target: Where a search ends at the latest; ``None`` where it is no search.
+        target: Where it was to go: where a search ends at the latest; ``None`` for no movement.
     """
 
     kind: RehearsedKind
@@ -78,6 +79,17 @@ class RehearsedStep:
     def farthest(self) -> Pose:
         """How far the frame may go."""
         return self.target or self.end
+
+    def farthest_flange(self, dx_mm: float = 0.0, dy_mm: float = 0.0) -> Pose:
+        """Return where the flange is then.
+
+        Args:
+            dx_mm: How far the frame is from its place, along X of the flange.
+            dy_mm: The same along Y.
+        """
+        frame = self.frame
+        beside = replace(frame, x_mm=frame.x_mm + dx_mm, y_mm=frame.y_mm + dy_mm)
+        return flange_of(self.farthest, beside)
 
     def way(self, speeds: MotionProfile) -> Way:
         """Return the way of a movement.
@@ -106,6 +118,18 @@ class RehearsedTime:
     seconds: float
     answers: float
     left_out: int
+
+
+@runtime_checkable
+class TellsReach(Protocol):
+    """A group whose controller tells whether the arm gets to a place."""
+
+    def reaches(self, target: Pose) -> bool:
+        """Read whether the frame of the selected tool can be there.
+
+        Args:
+            target: Where.
+        """
 
 
 @runtime_checkable
@@ -234,6 +258,40 @@ class Rehearsal:
             seconds += takes_s or 0.0
         return RehearsedTime(seconds, answers, left_out)
 
+    @property
+    def turning(self) -> list[RehearsedStep]:
+        """The movements of the turn tests: those of another frame than the flange."""
+        return [step for step in self.steps if step.frame != ToolOffset() and step.goes]
+
+    def beyond_reach(self, controller: Controller, slack_mm: float) -> RehearsedStep | None:
+        """Return the first movement of a turn test that the arm cannot make; only reads.
+
+        Args:
+            controller: The controller, whose arm is asked; nothing is asked of one that cannot
+                tell.
+            slack_mm: How far the tip may be beside its place, X and Y of the flange: only if no tip
+                on that circle lets the arm make all movements is one returned.
+        """
+        group, turning = controller.groups[0], self.turning
+        if not turning or not isinstance(group, TellsReach):
+            return None
+        arm, refused, first = ArmAhead.of(controller), list[RehearsedStep](), None
+        for dx_mm, dy_mm in _tips_about(slack_mm):
+            asked = set[tuple[float, ...]]()
+            for step in (*refused, *turning):
+                flange = step.farthest_flange(dx_mm, dy_mm)
+                place = tuple(round(at, 3) for at in flange.coordinates())
+                if place in asked:
+                    continue
+                asked.add(place)
+                if not group.reaches(arm.tip(flange)):
+                    # What one tip cannot reach is asked first for the next.
+                    refused, first = [step], first or step
+                    break
+            else:
+                return None
+        return first
+
     def _answer(self, step: Step, consider: Callable[..., tuple[str, ...]]) -> object:
         match step:
             case Consider():
@@ -250,7 +308,11 @@ class Rehearsal:
                 contact = None if step.contact is None else True
                 return TouchedAt.of(self.here, seconds=_ANSWERED_AFTER_S, contact=contact)
             case Move():
-                self._did(RehearsedKind.MOVE, step.target, step.purpose, path=step.path)
+                end = step.target
+                if step.aside_mm:
+                    # Where beside it stops is drawn when it is taken; it is a way of its own.
+                    end = replace(end, x_mm=end.x_mm + step.aside_mm)
+                self._did(RehearsedKind.MOVE, end, step.purpose, path=step.path, target=step.target)
             case Seek():
                 self._did(
                     RehearsedKind.SEARCH,
@@ -287,3 +349,15 @@ def _seen(step: Look) -> tuple[Spot, SpotUnit]:
 
 _USUAL_MM_PER_PX: Final = 0.02
 """How long a pixel is taken to be before it is measured, in mm; no movement depends on it."""
+
+
+_DIRECTIONS: Final = 12
+"""Number of tips around the expected one for which the arm is asked."""
+
+
+def _tips_about(by_mm: float) -> Iterator[tuple[float, float]]:
+    """Yield by how much a tip may be beside the expected one, which is the first."""
+    yield 0.0, 0.0
+    for number in range(_DIRECTIONS if by_mm else 0):
+        angle = math.tau * number / _DIRECTIONS
+        yield by_mm * math.cos(angle), by_mm * math.sin(angle)

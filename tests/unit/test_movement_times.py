@@ -152,6 +152,17 @@ def test_a_plc_needs_its_kinematics_and_its_axes_for_a_direct_movement():
     assert SoftMotionTimes("Kin_Gantry3", axes).move_s(there) == pytest.approx(0.5, abs=0.04)
 
 
+def test_each_axis_of_a_plc_moves_by_its_own_coordinate():
+    turned = way(replace(HERE, x_mm=405, u_deg=60, v_deg=-10))
+    for kinematics, speeds, slowest_s in (
+        ("Kin_Gantry3", (500, 500, 500), 5 / 25),
+        ("Kin_Gantry3+Kin_CAxis", (500, 500, 500, 720), 60 / 36),
+        ("Kin_5Axes", (500, 500, 500, 7200, 36), 10 / 1.8),
+    ):
+        times = SoftMotionTimes(kinematics, JointRates(speeds, (1e6,) * len(speeds)))
+        assert seconds(times, turned) == pytest.approx(slowest_s, abs=0.05)
+
+
 def test_a_stated_acceleration_makes_a_plc_slower():
     line, plc = way(HERE, MOVE, length_mm=30), SoftMotionTimes("Kin_Gantry3", None)
     assert seconds(replace(plc, acceleration_mm_s2=50), line) > seconds(plc, line)

@@ -1,9 +1,14 @@
 """A procedure is gone through beforehand as it will go if the tip is where it is expected."""
 
+import math
+from types import SimpleNamespace
+
 import pytest
 
 from robolink.calibration import Beam
-from robolink.controllers import AnswerCounts
+from robolink.calibration_run import ChangePlan, ToolPlan
+from robolink.calibration_run._preview import rehearse
+from robolink.controllers import AnswerCounts, SimpleController
 from robolink.errors import CalibrationError
 from robolink.methods import BeamsParameters, measure_beams
 from robolink.model import InputEdge, MotionProfile, Path, Pose, ToolOffset
@@ -119,3 +124,88 @@ def test_a_procedure_that_makes_nothing_of_what_is_expected_is_closed():
     with pytest.raises(CalibrationError, match="No"):
         Rehearsal(HERE).run(refusing())
     assert closed
+
+
+class Reaching:
+    """A group whose arm gets as far as a circle about its axis."""
+
+    def __init__(self, reach_mm):
+        self.reach_mm = reach_mm
+        self.asked = []
+
+    def pose(self):
+        return HERE
+
+    def reaches(self, target):
+        self.asked.append(target)
+        return math.hypot(target.x_mm, target.y_mm) <= self.reach_mm
+
+
+def turned(reach_mm):
+    """A rehearsed turn test at 310 mm, and the controller whose arm is asked."""
+    rehearsal, group = Rehearsal(HERE), Reaching(reach_mm)
+    rehearsal.select(Pose(310, 0, 0, 0, tool=1), ToolOffset(10))
+
+    def turning():
+        yield Move(Pose(310, 0, 50, 90, tool=1), Path.JOINT, "Above.")
+        yield Move(Pose(310, 0, 0, 90, tool=1), Path.STRAIGHT, "Down.")
+        yield Move(Pose(310, 0, 0, 180, tool=1), Path.JOINT, "Half a turn.")
+
+    rehearsal.run(turning())
+    return rehearsal, SimpleNamespace(groups=(group,), tools=None)
+
+
+def test_what_the_arm_reaches_is_asked_once_a_place():
+    rehearsal, cell = turned(330)
+    assert rehearsal.beyond_reach(cell, 2) is None
+    assert [round(at.x_mm) for at in cell.groups[0].asked] == [310, 310, 320]
+
+
+def test_a_place_that_another_tip_reaches_is_none_to_refuse():
+    # The flange stands at 320 mm with the tip turned by half a turn.
+    rehearsal, cell = turned(318.5)
+    assert rehearsal.beyond_reach(cell, 2) is None
+    for slack_mm in (0, 1):
+        rehearsal, cell = turned(318.5)
+        far = rehearsal.beyond_reach(cell, slack_mm)
+        assert far is not None
+        assert far.purpose == "Half a turn."
+
+
+def test_places_that_no_single_tip_reaches_together_are_refused():
+    # To the one side the tip would have to be longer, to the other shorter.
+    rehearsal, cell = turned(319.5)
+
+    def turning_back():
+        yield Move(Pose(330, 0, 0, 0, tool=1), Path.JOINT, "Back.")
+
+    rehearsal.run(turning_back())
+    assert rehearsal.beyond_reach(cell, 1) is not None
+
+
+def test_an_arm_that_cannot_tell_is_not_asked():
+    rehearsal, _ = turned(0)
+    assert rehearsal.beyond_reach(SimpleNamespace(groups=(object(),)), 1) is None
+
+
+class Broken:
+    """A method of another package, which makes nothing of what is expected."""
+
+    sentence = remedy = ""
+    clearance_mm = None
+
+    def procedure(self, stored, here):
+        yield Move(LOW, Path.STRAIGHT, "Down.")
+        raise ZeroDivisionError
+
+    def measure(self, context, tool, stored):
+        raise NotImplementedError
+
+    def verify(self, context, tool, result, *, tip, tolerance_mm):
+        raise NotImplementedError
+
+
+def test_a_method_that_breaks_at_expected_answers_does_not_end_a_run_that_could_work():
+    plan = ChangePlan((ToolPlan(1, source=Broken()),))
+    with SimpleController(identity="rehearsal-broken") as controller:
+        assert rehearse(controller, plan, here=HERE, stored={1: TIP}) is None

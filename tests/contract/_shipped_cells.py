@@ -54,6 +54,36 @@ class ShippedCell:
         return ("--nozzle", "N-7", "--lot", "L", "--yes", "--json")
 
 
+AXES: Final = {
+    "Kin_5Axes": ([500, 500, 500, 720, 360], [5000, 5000, 5000, 3600, 1800]),
+    "Kin_Gantry3": ([500, 500, 500], [5000, 5000, 5000]),
+    "T6-602S": ([360, 540, 1000, 1500], [1800, 2700, 5000, 7500]),
+}
+"""Joint speeds and accelerations of the simulated machines, as a cell file states them."""
+
+
+@contextmanager
+def with_cell_file(cell: ShippedCell, machine: str, *more: str) -> Iterator[ShippedCell]:
+    """Name a cell in a file that states how fast its joints are.
+
+    Args:
+        cell: The cell.
+        machine: Whose joints; those that a model has by itself are not stated.
+        more: Further lines.
+    """
+    speeds, accelerations = AXES.get(machine, (None, None))
+    lines = [f'[cells.shop]\nurl = "{cell.url}"', *more]
+    if cell.url.startswith("epson"):
+        lines += ["remote_timeout_s = 60", 'remote_timeout_confirmed_by = "M. Li, today"']
+    if speeds:
+        lines += [f"joint_speeds = {speeds}", f"joint_accelerations = {accelerations}"]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robolink.toml"
+        path.write_text("\n".join(lines) + "\n")
+        with patch.dict(os.environ, {"ROBOLINK_CONFIG": str(path)}):
+            yield replace(cell, url="shop")
+
+
 @contextmanager
 def touched(name: str, **habits: Any) -> Iterator[ShippedCell]:
     """Set up a SCARA with a pin, a second tool, and two beams.

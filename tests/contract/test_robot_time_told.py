@@ -43,9 +43,10 @@ def dry(cell, recipe=None):
 def test_what_is_said_is_what_the_robot_takes_however_fast_its_controller_answers(tmp_path):
     with shipped_cell("needle-beams") as cell:
         said, first = dry(cell)
-        assert "How long the robot needs is not known before the first run of this kind." in said
-        assert (first["about_s"], first["changed"], first["answer_ms"]) == (None, False, 0)
-        assert 0 < first["straight_moves_s"] < carried_out(cell)["robot_s"]
+        assert "not counting moves of unknown speed (5) and what you do yourself." in said
+        assert (first["moves_left_out"], first["changed"], first["answer_ms"]) == (5, False, 0)
+        took_s = carried_out(cell)["robot_s"]
+        assert 0 < first["straight_moves_s"] < first["about_s"] < took_s
         # The way to the start is another one now: the tool stands turned.
         late = carried_out(answering(cell, 20))
         assert told(late)["earlier_runs"] == 1
@@ -62,8 +63,10 @@ def test_what_is_said_is_what_the_robot_takes_however_fast_its_controller_answer
         faster = tmp_path / "faster.toml"
         faster.write_text(cell.recipe.read_text().replace("mm_s = 60", "mm_s = 50"))
         said, other = dry(cell, faster)
-        assert "changed since the last run" in said
-        assert (other["about_s"], other["changed"]) == (None, True)
+        assert (other["earlier_runs"], other["changed"]) == (0, True)
+        # No run at this speed has shown how fast the joints are.
+        assert other["moves_left_out"] == 5
+        assert "not counting moves of unknown speed (5)" in said
 
 
 def test_a_person_who_takes_a_minute_changes_nothing():

@@ -217,6 +217,16 @@ def print_accel_s(index: int) -> Statement:
     return Statement(f"Print AccelS({index})")
 
 
+def print_accel(index: int) -> Statement:
+    """Accel of joint movements in percent: 1 acceleration, 2 deceleration."""
+    return Statement(f"Print Accel({index})")
+
+
+def print_speed_factor() -> Statement:
+    """SpeedFactor in percent: it scales the speed and acceleration of all movements."""
+    return Statement("Print SpeedFactor")
+
+
 def print_joint_angle(joint: int) -> Statement:
     """The commanded angle of joint 1 to 6 in degrees, mm for a linear joint."""
     check_range(tr("A joint"), joint, 1, _LAST_JOINT)

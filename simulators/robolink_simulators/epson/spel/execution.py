@@ -261,10 +261,11 @@ class StatementExecution:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``; each statement starts when the last one ends."""
-        arm = self._evaluator.session.machine.arm
+        machine = self._evaluator.session.machine
+        arm = machine.robot.arm
         while not self._done and now_ns >= (change_ns := self._change_ns):
             arm.advance(change_ns)
-            self._evaluator.session.machine.timed_bits.advance(change_ns)
+            machine.timed_bits.advance(change_ns)
             self._take_up(change_ns)
             self._seen_ns = change_ns
         arm.advance(now_ns)

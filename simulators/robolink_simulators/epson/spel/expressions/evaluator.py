@@ -288,7 +288,8 @@ def _local_number(word: str) -> int:
 
 def _flagged(point: Point, word: str) -> Point:
     if word in _HANDS:
-        return replace(point, hand=_HANDS[word])
+        hand = _HANDS[word]
+        return point if hand is point.hand else replace(point, hand=hand)
     if word.isdigit():
         number = _local_number(word)
         return point if number == point.local else replace(point, local=number)

@@ -93,7 +93,6 @@ def test_the_flags_that_commands_need_or_forbid_are_flags():
     assert all(command.needs | command.forbids <= known for command in COMMANDS)
 
 
-
 @pytest.mark.parametrize("act", ["press_estop", "open_guard"])
 @pytest.mark.parametrize("request_", ["$Start,0", "$SetMotorsOn,1", "$Home,1", '$Execute,"Tool 0"'])
 def test_nothing_moves_with_the_stop_pressed_or_the_guard_open(simulator, client, act, request_):

@@ -5,7 +5,7 @@ What keeps two procedures of this process apart stands here too.
 
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
@@ -163,16 +163,20 @@ class ProcedureLock:
             self._waiting.remove(me)
             self._room.notify_all()
 
-    @contextmanager
-    def _leased(self, request: str, *, wanted: bool = True) -> Iterator[bool]:
+    def _leased(
+        self, request: str, *, wanted: bool = True
+    ) -> AbstractContextManager[bool, bool | None]:
         """Wait for the lease if this call may wait, and keep it for the block.
 
         So nobody comes in between what is read and what is written. A record that cannot be kept
         is told by what needs it.
         """
-        if not (wanted and self.patience.waits and self._depth == 1):
-            yield False
-            return
+        if wanted and self.patience.waits and self._depth == 1:
+            return self._lease_kept(request)
+        return nullcontext(False)
+
+    @contextmanager
+    def _lease_kept(self, request: str) -> Iterator[bool]:
         with ExitStack() as held:
 
             def take() -> None:

@@ -274,8 +274,9 @@ class Evaluator:
 
 
 def _bounded(point: Point) -> Point:
-    if any(not abs(value) <= FARTHEST for value in point.coordinates):
-        raise out_of_range("Coordinate out of range")
+    for value in point.coordinates:
+        if not abs(value) <= FARTHEST:  # that refuses what is no number, too
+            raise out_of_range("Coordinate out of range")
     return point
 
 

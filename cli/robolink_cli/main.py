@@ -21,10 +21,10 @@ from robolink_cli.console.output import (
     colour_wanted,
     hand_over,
     help_width,
-    may_be_guided,
     tolerate_any_console,
     watched_output,
 )
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
 from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.lazy_group import FrontPage
@@ -53,7 +53,7 @@ def cli(context: click.Context) -> object:
     if context.invoked_subcommand is not None:
         return None
     # With a cell and no command, ask what to do.
-    if not may_be_guided() or json_is_on():
+    if not person_here() or json_is_on():
         context.fail(gettext("Missing command."))  # in click's own words
     guided = cli.get_command(context, "change")
     assert guided is not None  # noqa: S101 - it is in the map
@@ -178,8 +178,17 @@ def _explained(error: BaseException) -> BaseException:
 
 
 def _invoke(arguments: Sequence[str]) -> int:
-    if not arguments and may_be_guided():
+    if not arguments and person_here():
         arguments = ["change"]  # without arguments, ask what to do
+    if person_here() is not Person.WIRE:
+        return _carried_out(arguments)
+    from robolink_cli.wizard.host import whole_command
+    from robolink_cli.wizard.state import Header
+
+    return whole_command(Header("", " ".join(arguments[:1])), lambda: _carried_out(arguments))
+
+
+def _carried_out(arguments: Sequence[str]) -> int:
     colour = colour_wanted()
     width = help_width()
     with _root().make_context(

@@ -228,6 +228,8 @@ class CellSettings(BaseModel):
             and largest single one, that is believed.
         interval_tolerance_mm: Largest distance from the truth within which a tip lies in 95 %.
         accuracy: What is stated of the rows of a budget for the whole cell.
+        watch_s: How often a panel looks at the cell while no job runs; a missing one is for only
+            when its page is opened.
         people: Who works at the cell: badge or name, and ``operator`` or ``engineer``.
         stations: Pins, beams, surfaces and cameras that stand there, by name.
         notes: For people.
@@ -256,6 +258,7 @@ class CellSettings(BaseModel):
     residual_tolerance_mm: Positive | None = None
     interval_tolerance_mm: Positive | None = None
     accuracy: AccuracySettings | None = None
+    watch_s: Annotated[float, Field(ge=5)] | None = None
     people: dict[Text, PersonRole] | None = None
     stations: dict[Text, StationSettings] | None = None
     notes: str | None = None

@@ -16,8 +16,9 @@ from robolink_cli.access.cell import acceleration_of, require_expected_robot
 from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on, note
-from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
+from robolink_cli.prompts.questions import WATCHED, asked
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import CELL, REACHED
 from robolink_cli.session.operator_identity import signature_of
@@ -263,7 +264,7 @@ def _offer_to_restore(controller: "Controller", markers: "Iterable[Marker]") -> 
     That comes before anything else is done. A no changes nothing and the command goes on. Nothing
     is asked of a script, nor where the controller is not in a state to be told anything.
     """
-    if json_is_on() or not on_terminal():
+    if json_is_on() or not person_here():
         return
     from robolink.model import MarkerKind
 

@@ -5,7 +5,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 import click
@@ -38,13 +38,14 @@ class Desk:
 
     Args:
         now_s: A monotonic clock of this computer, in seconds.
+        after: Number of what was shown last: a press of then does not answer a question of now.
     """
 
-    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, now_s: Callable[[], float] = time.monotonic, after: int = 0) -> None:
         self._now_s = now_s
         self._happened: queue.SimpleQueue[Happening] = queue.SimpleQueue()
         self._answers: queue.SimpleQueue[SendAnswer] = queue.SimpleQueue()
-        self._number = 0
+        self._number = after
         self._told_waiting = False
         self._gone = False
         self._looked_s = 0.0
@@ -158,16 +159,20 @@ T = TypeVar("T")
 class Work(Generic[T]):
     """The work of one command in its thread.
 
+    Args:
+        do: The work.
+        context: The command's; by default that of the caller, if there is one by now.
+
     Attributes:
         result: What it returned.
         error: What ended it.
     """
 
-    def __init__(self, do: Callable[[], T]) -> None:
+    def __init__(self, do: Callable[[], T], context: click.Context | None = None) -> None:
         self._do = do
         self._ended = threading.Event()
         self._begun = threading.Event()
-        self._click = click.get_current_context()
+        self._click = context or click.get_current_context(silent=True)
         self.result: T | None = None
         self.error: BaseException | None = None
 
@@ -186,9 +191,12 @@ class Work(Generic[T]):
         """Wait for its end for so long; return whether it has come."""
         return self._ended.wait(seconds)
 
+    def _scope(self) -> AbstractContextManager[object]:
+        return nullcontext() if self._click is None else self._click.scope(cleanup=False)
+
     def _run(self) -> None:
         try:
-            with self._click.scope(cleanup=False), heard_by_this_thread():
+            with self._scope(), heard_by_this_thread():
                 self._begun.set()
                 self.result = self._do()
         except BaseException as error:

@@ -331,7 +331,8 @@ class InterruptGate:
         if self._depth and _handler.heard_here():
             self._depth -= 1
             _handler.depth -= 1
-            _handler.let_out()
+            if _handler.held is not None:
+                _handler.let_out()
 
 
 class _SeenThrough(InterruptGate):

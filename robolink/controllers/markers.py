@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
+from types import TracebackType
 from typing import Final
 
 from robolink import runtime
@@ -192,6 +193,28 @@ class ProcedureLock:
                 yield False
                 return
             yield True
+
+
+class _Doubt:
+    """See :meth:`MarkerStore.doubt`; each exchange of a movement is made in one."""
+
+    __slots__ = ("_markers", "_request")
+
+    def __init__(self, markers: "MarkerStore", request: str) -> None:
+        self._markers = markers
+        self._request = request
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if isinstance(error, (TransportError, RemoteProtocolError)):
+            raise self._markers.unproved(self._request, error) from error
 
 
 class MarkerStore:
@@ -438,13 +461,9 @@ class MarkerStore:
         }
         return [m for m in self.outcomes.open_markers() if m.operation not in own]
 
-    @contextmanager
-    def doubt(self, request: str) -> Iterator[None]:
+    def doubt(self, request: str) -> AbstractContextManager[None]:
         """Turn a lost answer inside the block into OutcomeUnknownError."""
-        try:
-            yield
-        except (TransportError, RemoteProtocolError) as error:
-            raise self.unproved(request, error) from error
+        return _Doubt(self, request)
 
     def unproved(self, request: str, error: RobolinkError) -> OutcomeUnknownError:
         """Return the error for a request whose effect ``error`` leaves unknown."""

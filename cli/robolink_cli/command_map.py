@@ -78,8 +78,8 @@ SHORT_NAMES: Final = {
     "recipe": f"{SHIPPED}.recipe:recipe",
 }
 """Names that work but are not listed; the line below the list names ``demo``. ``check``,
-``check-contract``, ``docs`` and ``recipe`` are short for commands listed under ``cell`` and
-``expert``. The former commands of ``config`` name
+``check-contract``, ``demo``, ``docs`` and ``recipe`` are short for commands listed under ``cell``
+and ``expert``. The former commands of ``config`` name
 their replacements.
 """
 

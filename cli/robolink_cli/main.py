@@ -24,7 +24,7 @@ from robolink_cli.console.output import (
     tolerate_any_console,
     watched_output,
 )
-from robolink_cli.console.person import Person, person_here
+from robolink_cli.console.person import Person, may_be_guided, person_here
 from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
 from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.lazy_group import FrontPage
@@ -53,7 +53,7 @@ def cli(context: click.Context) -> object:
     if context.invoked_subcommand is not None:
         return None
     # With a cell and no command, ask what to do.
-    if not person_here() or json_is_on():
+    if not may_be_guided() or json_is_on():
         context.fail(gettext("Missing command."))  # in click's own words
     guided = cli.get_command(context, "change")
     assert guided is not None  # noqa: S101 - it is in the map
@@ -178,7 +178,7 @@ def _explained(error: BaseException) -> BaseException:
 
 
 def _invoke(arguments: Sequence[str]) -> int:
-    if not arguments and person_here():
+    if not arguments and may_be_guided():
         arguments = ["change"]  # without arguments, ask what to do
     if person_here() is not Person.WIRE:
         return _carried_out(arguments)

@@ -97,7 +97,7 @@ def test_what_changes_something_takes_no_cell_where_nobody_is_asked(
 
 
 def test_yes_on_a_terminal_is_no_answer_either(cells, simulator, monkeypatch):
-    monkeypatch.setattr("robolink_cli.session.context.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.context.may_be_guided", lambda: True)
     cells("line3")
     code, shown = run_on_terminal("tool", "select", "0", "--yes")
     assert code == 2

@@ -35,6 +35,20 @@ def person_here() -> Person:
     return Person.TERMINAL if ends else Person.NOBODY
 
 
+def may_be_guided() -> bool:
+    """Return whether a wizard can guide the person: at a wire, or at a terminal that is real.
+
+    Streams that a program puts in place of its terminal can be asked line by line alone.
+    """
+    if _at is not None:
+        return bool(_at)
+    try:
+        ends = [stream.fileno() for stream in (sys.stdin, sys.stderr)]
+        return all(os.isatty(end) and _is_no_other_device(end) for end in ends)
+    except (OSError, ValueError, AttributeError):  # closed, or a stream inside a program
+        return False
+
+
 @contextmanager
 def person_at(place: Person) -> Iterator[None]:
     """Let the entry say where the person is, for the block; else the streams tell it."""

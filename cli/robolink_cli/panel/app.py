@@ -24,6 +24,7 @@ from robolink.locale.languages import language_named
 from robolink.messages import in_english, tr
 from robolink_cli.panel.cards import ChangeRow, ChartCard
 from robolink_cli.panel.guard.access import Access
+from robolink_cli.panel.guard.live import ANYTIME
 from robolink_cli.panel.guard.pairing import Tablet
 from robolink_cli.panel.guard.requests import MOST_BYTES, parsed
 from robolink_cli.panel.history import changes_of, charts_of, page_of
@@ -264,6 +265,10 @@ class Panel:
             self._note("refused", live.cell, why="number", **facts)
             with speaking_in(self._tastes.of(tablet.id).language):
                 return tr("The screen has changed. Nothing was pressed.")
+        why = self._access.why_not_answer(tablet, live.cell, job.who)
+        if why and action not in ANYTIME:
+            self._note("refused", live.cell, why="role", **facts)
+            return why
         question = in_english(job.view.head.title) if job.view is not None else ""
         self._note("answer", live.cell, question=question, **facts)
         job.press(board.question(), action, value)
@@ -281,6 +286,8 @@ class Panel:
             job.beat(finger)
         elif frame.get("number") == board.number:
             tablet, axis = self._access.tablet_of(socket.scope), _text(frame.get("axis"))
+            if self._access.why_not_answer(tablet, live.cell, job.who):
+                return
             facts = {"tablet": tablet.id[:_ID], "who": tablet.who, "action": "hold"}
             self._note("answer", live.cell, value=axis, **facts)
             job.hold(board.question(), axis, finger)

@@ -15,7 +15,7 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from robolink.locale.languages import CHINESE, ENGLISH, translator
+from robolink.locale.languages import CHINESE, ENGLISH, LANGUAGES, translator
 from robolink.report._markup import plain
 from robolink_cli.panel import drawings
 from robolink_cli.panel.cards import CellCard
@@ -250,6 +250,7 @@ def _environment() -> Environment:
         "turn_picture": drawings.turn_drawing,
         "before_after": drawings.before_after_drawing,
         "in_order": _in_order,
+        "label_of": _label_of,
         "body_of": _body_of,
         "place_sign": lambda place: _PLACES.get(place, ""),
         "mark_sign": lambda mark: _MARKS.get(mark, _UNKNOWN),
@@ -271,6 +272,22 @@ def _shown(value: Any) -> Any:  # noqa: ANN401 - any value that a template shows
 def _in_order(actions: Sequence[Action]) -> list[Action]:
     """Return actions from the left to the right: what leaves is far from the main one."""
     return sorted(actions, key=lambda action: _ORDER.index(action.weight))
+
+
+def _label_of(action: Action, tr: Callable[..., str]) -> str:
+    """Return what a button is called.
+
+    A terminal calls the key that ends the job STOP. On a page that is the name of one button.
+    """
+    if action.name == "leave" and action.label in _stops():
+        return tr("End the job")
+    return action.label
+
+
+@cache
+def _stops() -> frozenset[str]:
+    sentences = ("STOP", "STOP, leave")
+    return frozenset(_words(one)(said) for one in LANGUAGES for said in sentences)
 
 
 def _body_of(values: Mapping[str, object]) -> str:

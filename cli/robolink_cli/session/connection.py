@@ -21,6 +21,7 @@ from robolink_cli.console.render import json_is_on, note
 from robolink_cli.prompts.questions import WATCHED, asked
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import CELL, REACHED
+from robolink_cli.session.movement_permits import asking_for_permits
 from robolink_cli.session.operator_identity import signature_of
 from robolink_cli.session.stop_listener import (
     listening_for_stop,
@@ -105,6 +106,7 @@ def open_controller(
         remember_address(context)
         with (
             watched_at_desk(controller),
+            asking_for_permits(controller, url, context.cell),
             listening_for_stop(controller, context, looks=unhindered),
             _saying_what_is_left(
                 controller, context, quiet=quiet, looks=looks, calms=calms, leaves=leaves

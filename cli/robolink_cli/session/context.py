@@ -19,7 +19,7 @@ from robolink_cli.access.cell import (
     only_cell,
     which_cell,
 )
-from robolink_cli.console.person import Person, person_here
+from robolink_cli.console.person import Person, may_be_guided, person_here
 from robolink_cli.console.render import json_is_on, log_wanted, note
 from robolink_cli.options.declaration import add_declared, packed
 from robolink_cli.options.shared import GIVEN, TYPED, all_shared
@@ -206,7 +206,7 @@ def _with_only_cell(options: Mapping[str, object]) -> Mapping[str, Any]:
     """
     given: Mapping[str, Any] = click.get_current_context().meta.get(GIVEN, {})
     changes = "yes" in options and not options.get("dry_run")
-    if given.get("url") is not None or (changes and (options["yes"] or not person_here())):
+    if given.get("url") is not None or (changes and (options["yes"] or not may_be_guided())):
         return given
     name = only_cell()
     if not name:
@@ -280,7 +280,7 @@ def guided_if_alone(
     Raises:
         BaseException: Whatever ended the work.
     """
-    if not alone or not person_here():
+    if not alone or not may_be_guided():
         return do()
     from robolink_cli.wizard.host import guided
 

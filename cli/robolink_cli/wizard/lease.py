@@ -2,7 +2,8 @@
 
 Every sign by which a browser tells that a finger was lifted is missing in some case. So the page
 says ten times a second that it is still there. A finger that was silent for the time of a lease, or
-was lifted, never jogs again, whatever comes of it later.
+was lifted, never jogs again, whatever comes of it later. And each sign is good for one step: after
+the last one, one more step begins at most.
 """
 
 from dataclasses import dataclass, replace
@@ -27,12 +28,14 @@ class Hold:
         axis: The key: ``x+``.
         finger: Which finger-down it is.
         seen_s: When it was known to be down last.
+        fresh: Whether no step was made since then.
     """
 
     number: int
     axis: str
     finger: str
     seen_s: float
+    fresh: bool = True
 
 
 class JogLease:
@@ -57,7 +60,7 @@ class JogLease:
         """Note that a finger is still down; of another one, or too late, it counts for nothing."""
         hold = self.held(now_s)
         if hold is not None and hold.finger == finger:
-            self._hold = replace(hold, seen_s=now_s)
+            self._hold = replace(hold, seen_s=now_s, fresh=True)
 
     def release(self, finger: str) -> None:
         """Note that a finger was lifted; also if its ``hold`` should arrive later."""
@@ -79,6 +82,14 @@ class JogLease:
             self.end()
             return None
         return hold
+
+    def spend(self, now_s: float) -> bool:
+        """Return whether the next step may begin now; the last sign of the finger is spent then."""
+        hold = self.held(now_s)
+        if hold is None or not hold.fresh:
+            return False
+        self._hold = replace(hold, fresh=False)
+        return True
 
     def _forget(self, finger: str) -> None:
         if len(self._dead) < _MOST_FINGERS:

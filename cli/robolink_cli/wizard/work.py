@@ -14,6 +14,7 @@ from robolink.errors import DeclinedError, RobolinkError
 from robolink.interrupts import heard_by_this_thread, heed
 from robolink.messages import tr
 from robolink.runner import MoveSubject, Question
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.wizard.happenings import (
     Happening,
     Reading,
@@ -51,6 +52,7 @@ class Desk:
         self._looked_s = 0.0
         self._moves = threading.Event()
         self.glance: Callable[[], Reading | None] = lambda: None
+        self.silent_s: Callable[[], float] = lambda: 0.0
 
     def tell(self, text: str) -> None:
         """Show a line."""
@@ -83,11 +85,7 @@ class Desk:
             self._happened.put(WaitsForAnswer(self._number, self._now_s()))
         while True:
             heed()
-            if self._gone:
-                raise DeclinedError(
-                    tr("The keyboard is gone. Nothing was answered for you."),
-                    remedy=tr("Run it on a terminal, or with --assist on a simulator."),
-                )
+            self._require_somebody()
             left_s = end_s - self._now_s()
             try:
                 answer = self._answers.get(timeout=max(0.0, min(GLANCE_S, left_s)))
@@ -100,6 +98,40 @@ class Desk:
             if answer.number == self._number:
                 self._told_waiting = False
                 return answer.text
+
+    def wait_while(self, why: Callable[[], str]) -> None:
+        """Wait as long as something keeps the work back; say what, and read the controller.
+
+        Args:
+            why: Returns what keeps it back, empty for nothing.
+
+        Raises:
+            DeclinedError: There is nobody any more who could change that.
+            Interrupted: The work is to end.
+        """
+        told = ""
+        while reason := why():
+            heed()
+            self._require_somebody()
+            if reason != told:
+                self.tell(reason)
+                told = reason
+            self._look()
+            time.sleep(GLANCE_S)
+        if told:
+            self.tell(tr("The robot goes on."))
+
+    def _require_somebody(self) -> None:
+        if self._gone and person_here() is Person.WIRE:
+            raise DeclinedError(
+                tr("The panel is gone. Nothing was answered for you."),
+                remedy=tr("Start the job again from its page."),
+            )
+        if self._gone:
+            raise DeclinedError(
+                tr("The keyboard is gone. Nothing was answered for you."),
+                remedy=tr("Run it on a terminal, or with --assist on a simulator."),
+            )
 
     @contextmanager
     def following(self, look: Callable[[], Reading | None]) -> Iterator[None]:

@@ -1,6 +1,12 @@
 """Fingers on a page, by the touch events of the browser's own protocol."""
 
-from playwright.sync_api import Error
+import time
+
+
+MIDDLE = """(selector) => {
+  const box = document.querySelector(selector)?.getBoundingClientRect();
+  return box && box.width ? {x: box.x + box.width / 2, y: box.y + box.height / 2} : null;
+}"""
 
 
 class Fingers:
@@ -17,9 +23,14 @@ class Fingers:
 
     def middle(self, selector):
         """Return the middle of the first element that a selector finds."""
-        box = self._page.locator(selector).first.bounding_box()
-        assert box is not None, selector
-        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        end_s = time.monotonic() + 15.0
+        while True:
+            # A part may be drawn anew at any moment: found and measured in one go.
+            at = self._page.evaluate(MIDDLE, selector)
+            if at is not None:
+                return at["x"], at["y"]
+            assert time.monotonic() < end_s, selector
+            time.sleep(0.02)
 
     def down(self, where, number=0):
         """Put a finger down, on an element or a place."""
@@ -38,6 +49,12 @@ class Fingers:
         del self._down[number]
         self._send("touchEnd")
 
+    def lift(self):
+        """Take all fingers away."""
+        if self._down:
+            self._down = {}
+            self._send("touchEnd")
+
     def tap(self, where):
         """Touch once."""
         self.down(where)
@@ -46,12 +63,3 @@ class Fingers:
     def _send(self, kind):
         points = [{"x": x, "y": y, "id": number} for number, (x, y) in self._down.items()]
         self._protocol.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-
-
-def is_gone(page):
-    """Return whether a page is closed."""
-    try:
-        page.evaluate("1")
-    except Error:
-        return True
-    return False

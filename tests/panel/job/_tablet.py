@@ -6,6 +6,8 @@ import socket
 import threading
 import time
 from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
 from robolink_cli import job_process
 from robolink_cli.wizard.views.records import (
@@ -19,6 +21,7 @@ from robolink_cli.wizard.views.records import (
 )
 from robolink_cli.wizard.views.wire import from_wire
 
+RECIPE = Path(__file__).parents[3] / "examples" / "recipes" / "needle-one-touch.toml"
 SIZES = (5.0, 1.0, 0.5, 0.1, 0.01)
 
 
@@ -40,7 +43,9 @@ class Tablet:
     """
 
     def __init__(self, wire, *, lives=True):
-        self.wire, self.view, self.views, self.told, self.left = wire, None, [], [], None
+        self.wire, self.views, self.told = wire, [], []
+        self.view: Any = None
+        self.left: Any = None
         self.came_s = []
         self._held = b""
         self._lock = threading.Lock()
@@ -147,10 +152,12 @@ class Hand:
 
     def tap(self, value):
         """Tap one step, and wait for its end."""
-        before = self.tablet.view.body.way
+        before = self.tablet.view.body.rows
         self.tablet.press("jog", value)
         self.tablet.see(
-            lambda view: view.waits and isinstance(view.body, TouchView) and view.body.way != before
+            lambda view: (
+                view.waits and isinstance(view.body, TouchView) and view.body.rows != before
+            )
         )
 
     def bring(self):
@@ -207,6 +214,13 @@ def change(tablet, eyes, needle="N-0418"):
             case EndView():
                 return body
         tablet.goes_on(number)
+
+
+def to_the_jog(tablet):
+    """Agree to a jog by hand, and wait for its pad."""
+    tablet.body(QuestionView)
+    tablet.press("yes")
+    tablet.body(TouchView)
 
 
 def at_the_wire(arguments, script, *, lives=True):

@@ -220,11 +220,13 @@ def own(state_folder):
 
 
 def test_it_stops_a_controller_that_nobody_has_and_leaves_a_note(robot, own):
-    simulator, url = robot
+    _, url = robot
     answer = stopped(own, url)
     assert answer.outcome is StopEnd.STOPPED, answer
     assert "has stopped (confirmed)" in answer.text
-    assert find_note(far_end_of(url)).who.startswith("mei")
+    note = find_note(far_end_of(url))
+    assert note is not None
+    assert note.who.startswith("mei")
 
 
 def test_it_answers_in_the_language_of_the_tablet(robot, own):

@@ -24,6 +24,7 @@ from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
     from robolink.config import Cell
+    from robolink_cli.commands.simulate.panel_cells import DemoCells
     from robolink_cli.panel.hub import PanelCell
     from robolink_cli.panel.serving import Place, Served
 
@@ -90,9 +91,9 @@ def panel(
         raise click.UsageError(tr("--demo has cells of its own: leave --cells out."))
     host, port = host_and_port(listen, "--listen")
     with ExitStack() as stack:
-        told: list[str] = []
-        if demo:
-            cells, told = _demo(stack)
+        simulated = _demo(stack) if demo else None
+        if simulated is not None:
+            cells = simulated.cells_file
         if cells is not None:
             os.environ["ROBOLINK_CONFIG"] = str(cells.absolute())
         place, names = _place(host, port, certificate, key)
@@ -103,7 +104,7 @@ def panel(
         audit = Audit({cell.name: cell.url for cell in served.cells})
         stack.callback(audit.close)
         served = replace(served, audit=audit)
-        run(served, place, lambda url: _announce(url, served, told))
+        run(served, place, lambda url: _announce(url, served, simulated))
 
 
 def require_packages(names: tuple[str, ...]) -> None:
@@ -120,32 +121,17 @@ def require_packages(names: tuple[str, ...]) -> None:
         )
 
 
-def _demo(stack: ExitStack) -> tuple[Path, list[str]]:
-    """Serve simulated cells until a stack is closed; return their cell file, and what to say."""
+def _demo(stack: ExitStack) -> "DemoCells":
+    """Serve simulated cells until a stack is closed, with a state folder and a PIN of their own."""
     from robolink_cli.commands.simulate.panel_cells import demo_cells
     from robolink_cli.panel.guard.people import NOBODY, Pins
 
     cells = stack.enter_context(demo_cells())
     os.environ["ROBOLINK_STATE_DIR"] = str(cells.state)
-    os.chdir(cells.folder)  # jobs find the recipes that lie there
     stack.callback(os.chdir, os.getcwd())
-    pin = _drawn_pin()
-    Pins().set(NOBODY, Secret(pin))
-    told = [tr("SIMULATED: nothing real moves."), tr("PIN for moving and writing: {pin}", pin=pin)]
-    told += [
-        tr(
-            "To see how far a tip is from its pin: {command}",
-            command=f"robolink sim assist {one} look",
-        )
-        for one in cells.assists.values()
-    ]
-    return cells.cells_file, told
-
-
-def _drawn_pin() -> str:
-    import secrets
-
-    return f"{secrets.randbelow(9) + 1}{secrets.randbelow(10**6):06}2"
+    os.chdir(cells.folder)  # jobs find the recipes that lie there
+    Pins().set(NOBODY, Secret(cells.pin))
+    return cells
 
 
 def _place(
@@ -174,7 +160,8 @@ def _place(
             remedy=tr("Run 'robolink panel cert', or give --tls-cert and --tls-key."),
         )
     found = tls.load(path, own_key)
-    return Place(host, port, str(found.path), str(found.key)), found.names
+    name = found.names[0].replace("*", "panel") if host in ("0.0.0.0", "::") else ""
+    return Place(host, port, str(found.path), str(found.key), name), found.names
 
 
 def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
@@ -217,15 +204,19 @@ def _shown(cell: "Cell") -> "PanelCell":
     return PanelCell(cell.name, cell.url, cell.settings.watch_s)
 
 
-def _announce(url: str, served: "Served", told: list[str]) -> None:
+def _announce(url: str, served: "Served", simulated: "DemoCells | None") -> None:
     """Tell where the panel is, once it listens."""
     if json_is_on():
-        names = [cell.name for cell in served.cells]
-        about = {"url": url, "cells": names, "pid": os.getpid()}
-        hand_over(json.dumps({"schema": "robolink/panel/1", **about}))
+        about = {"url": url, "cells": [cell.name for cell in served.cells], "pid": os.getpid()}
+        demo = None if simulated is None else simulated.payload()
+        hand_over(json.dumps({"schema": "robolink/panel/1", **about, "demo": demo}))
         return
     say(tr("Open {url} in a browser.", url=url))
-    for line in told:
-        say(line)
+    if simulated is not None:
+        say(tr("SIMULATED: nothing real moves."))
+        say(tr("PIN for moving and writing: {pin}", pin=simulated.pin))
+        for assist in simulated.assists.values():
+            command = f"robolink sim assist {assist} look"
+            say(tr("To see how far a tip is from its pin: {command}", command=command))
     say(tr("Ctrl-C ends it."))
     sys.stdout.flush()

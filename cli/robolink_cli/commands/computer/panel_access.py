@@ -13,10 +13,10 @@ from robolink.messages import known_names, tr
 from robolink.model import Secret
 from robolink.timing import local_label
 from robolink_cli.commands.computer.panel import require_packages
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.console.render import emit, json_is_on, say
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.prompts.person import Person, person_here
 
 _MOST_BYTES = 1000
 
@@ -171,7 +171,7 @@ def _of_file(file: Path) -> Secret:
         return Secret(lines[0].decode("ascii").strip() if lines else "")
     except OthersMayReadError as error:
         raise ConfigError(
-            tr("Other users may read the file {path}.", path=file),
+            tr("Others than its owner can read {path}.", path=file),
             remedy=tr("Run: chmod 600 {path}", path=file),
         ) from error
     except UnicodeError:

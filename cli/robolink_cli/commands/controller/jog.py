@@ -10,7 +10,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.person import person_here
+from robolink_cli.console.person import may_be_guided
 from robolink_cli.console.render import emit, show_requests
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
@@ -216,7 +216,7 @@ def _require_keys(steps: tuple[str, ...], *, dry_run: bool) -> None:
             tr("--keys cannot be combined with steps or a dry run."),
             remedy=tr("Leave out --keys to give steps, or to see their requests."),
         )
-    if not person_here():
+    if not may_be_guided():
         raise ConfigError(
             tr("This window cannot read single keys. Type steps instead."),
             remedy=tr("Run it on a terminal, or type steps: robolink robot jog x+0.1"),

@@ -153,11 +153,11 @@ def recalibrate(
     """
     from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
     from robolink_cli.commands.measure.recipe_choice import nobody_to_ask
-    from robolink_cli.console.person import person_here
+    from robolink_cli.console.person import may_be_guided
     from robolink_cli.console.render import note
     from robolink_cli.session.context import guided_if_alone
 
-    if recipe is None and not person_here():
+    if recipe is None and not may_be_guided():
         raise nobody_to_ask()
     require_no_dry_run(order, dry_run=dry_run)
     events = EventStream(click.get_current_context(), on=jsonl)

@@ -1,6 +1,7 @@
 """The simulated cells of ``panel --demo``: three kinds of controllers, in a folder of their own."""
 
 import json
+import secrets
 import shutil
 import subprocess
 import sys
@@ -50,6 +51,7 @@ class DemoCells:
         cells_file: Their cell file.
         state: Folder for what is on record of them.
         assists: Where the person at each cell is asked, by its name.
+        pin: For moving and writing on their pages.
         pid: Number of the process that serves them.
     """
 
@@ -57,7 +59,12 @@ class DemoCells:
     cells_file: Path
     state: Path
     assists: dict[str, str]
+    pin: str
     pid: int
+
+    def payload(self) -> dict[str, object]:
+        """Return what a script needs of it, as plain JSON."""
+        return {"pin": self.pin, "state_dir": str(self.state), "assists": self.assists}
 
 
 @contextmanager
@@ -84,9 +91,14 @@ def demo_cells() -> Iterator[DemoCells]:
                 content = (recipes_folder() / f"{recipe}.toml").read_bytes()
                 (folder / f"{name}.toml").write_bytes(content)
             assists = {name: one["assist"] for name, one in cells.items() if "assist" in one}
-            yield DemoCells(folder, cells_file, folder / "state", assists, pid)
+            yield DemoCells(folder, cells_file, folder / "state", assists, _pin(), pid)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _pin() -> str:
+    """Return a PIN, drawn anew each time, that is no series."""
+    return f"{10**5 + secrets.randbelow(9 * 10**5)}{secrets.randbelow(5)}9"
 
 
 _SETTINGS: Final = {

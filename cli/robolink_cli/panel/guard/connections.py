@@ -2,9 +2,10 @@
 
 All is judged where a connection is accepted, before TLS and before the first byte: a server that
 counts requests cannot see a connection that never sends one. A new connection is a stranger. It
-is known once a request of it was let in. There are few places for strangers, and a full one is
-made free by the oldest stranger of whichever address has most of them: so whoever opens ten
-thousand connections closes his own, and a tablet that comes meanwhile has its turn.
+is known once a request of it was let in. There are few places for strangers. Where all are taken,
+whoever has most of them makes room: so whoever opens ten thousand connections loses his own, and
+a tablet that comes meanwhile has its turn. What has no place is closed at once, before anything is
+made for it, and few are accepted between two other things that the server does.
 """
 
 import asyncio
@@ -15,6 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from ipaddress import IPv6Address, ip_address, ip_network
+from time import monotonic
 from typing import Any, Final
 
 MOST: Final = 64
@@ -28,6 +30,12 @@ OF_A_TABLET: Final = 24
 
 STRANGER_S: Final = 8.0
 """How long a connection may be a stranger, in seconds."""
+
+TURN_S: Final = 0.25
+"""How long a stranger keeps its place against another one of the same address, in seconds."""
+
+AT_ONCE: Final = 32
+"""Connections that are accepted before the server does something else."""
 
 UNTAKEN_MS: Final = 20_000
 """How long a far end may take nothing of what was sent, in ms: it sleeps, is gone, or will not."""
@@ -48,19 +56,21 @@ def network_of(address: str) -> str:
 
 
 @dataclass(eq=False, slots=True)
-class Connection:
+class TabletConnection:
     """One connection.
 
     Attributes:
         peer: Its far end.
         source: Whose it is: address or network.
         close: Closes it, from outside.
+        since_s: When it came, monotonic.
         tablet: Id of the tablet of a known one, which may be empty; ``None`` of a stranger.
     """
 
     peer: Peer
     source: str
     close: Callable[[], None]
+    since_s: float
     tablet: str | None = None
 
 
@@ -73,7 +83,7 @@ class Connections:
     """
 
     refused: int = 0
-    _open: dict[Peer, Connection] = field(default_factory=dict)
+    _open: dict[Peer, TabletConnection] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return how many there are."""
@@ -84,19 +94,26 @@ class Connections:
         """How many of them are strangers."""
         return sum(1 for connection in self._open.values() if connection.tablet is None)
 
-    def came(self, peer: Peer, close: Callable[[], None]) -> "Connection":
-        """Take a new connection in; another stranger makes room where there is none.
+    def came(self, peer: Peer, close: Callable[[], None]) -> "TabletConnection | None":
+        """Take a new connection in, ``None`` where it has no place; another may make room.
 
         Args:
             peer: Its far end.
             close: Closes it, from outside.
         """
+        source, now_s = network_of(peer[0]), monotonic()
         strangers = [one for one in self._open.values() if one.tablet is None]
         if len(strangers) >= STRANGERS:
             counted = Counter(one.source for one in strangers)
             most = max(counted.values())
-            self._drop(next(one for one in strangers if counted[one.source] == most))
-        connection = Connection(peer, network_of(peer[0]), close)
+            oldest = next(one for one in strangers if counted[one.source] == most)
+            if counted[source] == most:
+                oldest = next(one for one in strangers if one.source == source)
+                if now_s - oldest.since_s < TURN_S:
+                    self.refused += 1
+                    return None
+            self._drop(oldest)
+        connection = TabletConnection(peer, source, close, now_s)
         self._open[peer] = connection
         return connection
 
@@ -116,12 +133,12 @@ class Connections:
         connection.tablet = tablet
         return True
 
-    def went(self, connection: "Connection") -> None:
+    def went(self, connection: "TabletConnection") -> None:
         """Note that a connection has ended; its far end may be another's by now."""
         if self._open.get(connection.peer) is connection:
             del self._open[connection.peer]
 
-    def expire(self, connection: "Connection") -> None:
+    def expire(self, connection: "TabletConnection") -> None:
         """Close a connection that is a stranger still."""
         if connection.tablet is None and self._open.get(connection.peer) is connection:
             self._drop(connection)
@@ -132,7 +149,7 @@ class Connections:
         if connection is not None:
             self._drop(connection)
 
-    def _drop(self, connection: "Connection") -> None:
+    def _drop(self, connection: "TabletConnection") -> None:
         self.refused += 1
         self._open.pop(connection.peer, None)
         connection.close()
@@ -162,17 +179,34 @@ class GuardedSocket(socket.socket):
     """
 
     connections: Connections
+    _in_a_row = 0
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """Accept one connection; see the module."""
-        accepted, address = super().accept()
-        mine = _Accepted(fileno=accepted.detach())
-        if hasattr(socket, "TCP_USER_TIMEOUT"):
-            mine.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNTAKEN_MS)
-        connection = self.connections.came((address[0], address[1]), mine.cut)
-        mine.ended = partial(self.connections.went, connection)
-        asyncio.get_running_loop().call_later(STRANGER_S, self.connections.expire, connection)
-        return mine, address
+        """Accept one connection; see the module.
+
+        Raises:
+            BlockingIOError: There is none, or it is time for something else.
+        """
+        loop = asyncio.get_running_loop()
+        while self._in_a_row < AT_ONCE:
+            if self._in_a_row == 0:
+                loop.call_soon(self._anew)
+            self._in_a_row += 1
+            accepted, address = super().accept()
+            mine = _Accepted(fileno=accepted.detach())
+            connection = self.connections.came((address[0], address[1]), mine.cut)
+            if connection is None:
+                mine.close()
+                continue
+            if hasattr(socket, "TCP_USER_TIMEOUT"):
+                mine.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNTAKEN_MS)
+            mine.ended = partial(self.connections.went, connection)
+            loop.call_later(STRANGER_S, self.connections.expire, connection)
+            return mine, address
+        raise BlockingIOError
+
+    def _anew(self) -> None:
+        self._in_a_row = 0
 
 
 def listening(host: str, port: int, connections: Connections) -> GuardedSocket:

@@ -6,6 +6,7 @@ is dropped, and so is what comes faster than any hand.
 """
 
 import json
+import math
 import select
 import socket
 import threading
@@ -19,9 +20,6 @@ from robolink_cli.wizard.lease import Hold, JogLease
 
 LONGEST_LINE: Final = 64 * 1024
 """Most bytes of a line, both ways."""
-
-ALIVE_S: Final = 1.5
-"""Time in seconds for which a sign of life of the seat counts."""
 
 _MOST_PRESSES: Final = 16
 """Most presses that wait to be carried out. A hand is slower."""
@@ -48,7 +46,7 @@ class WireLink:
         self._presses: deque[Pressed] = deque()
         self._lease = JogLease()
         self._alive_s = time.monotonic()
-        self._left = False
+        self._left = self._broken = False
         self.came = threading.Event()
         """Set when something came; whoever looks clears it."""
         threading.Thread(target=self._read, name="wire", daemon=True).start()
@@ -60,12 +58,7 @@ class WireLink:
 
     def silent_s(self) -> float:
         """Return for how long nothing was heard of the seat, in seconds."""
-        return time.monotonic() - self._alive_s
-
-    @property
-    def seat_alive(self) -> bool:
-        """Whether the seat was heard of lately."""
-        return not self._left and self.silent_s() <= ALIVE_S
+        return math.inf if self._left else time.monotonic() - self._alive_s
 
     def presses(self) -> list[Pressed]:
         """Return what was pressed since the last call."""
@@ -78,6 +71,11 @@ class WireLink:
         """Return the key that is held now; ``None`` for none."""
         with self._lock:
             return self._lease.held(time.monotonic())
+
+    def spend_sign(self) -> bool:
+        """Return whether the next step of the held key may begin now, once for each sign."""
+        with self._lock:
+            return self._lease.spend(time.monotonic())
 
     def end_held(self) -> None:
         """End what is held."""
@@ -98,24 +96,28 @@ class WireLink:
     def _send(self, data: bytes) -> bool:
         rest = memoryview(data)
         end_s = time.monotonic() + _PATIENCE_S
-        while rest and not self._left:
+        while rest and not self._broken:
             try:
                 sent = self._wire.send(rest)
             except BlockingIOError:
                 left_s = end_s - time.monotonic()
                 if left_s <= 0 or not select.select([], [self._wire], [], left_s)[1]:
-                    self._leave()
+                    self._break()
             except (OSError, ValueError):
-                self._leave()
+                self._break()
             else:
                 rest = rest[sent:]
         return not rest
 
     def close(self) -> None:
         """Close the wire."""
-        self._leave()
+        self._break()
         with self._sending:
             self._wire.close()
+
+    def _break(self) -> None:
+        self._broken = True
+        self._leave()
 
     def _leave(self) -> None:
         self._left = True

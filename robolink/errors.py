@@ -359,6 +359,7 @@ class NotReadyReason(StrEnum):
     VIRTUAL_IO = "virtual_io"
     OTHER_ROBOT = "other_robot"
     OTHER_BASE = "other_base"
+    NOT_PERMITTED = "not_permitted"
 
 
 class NotReadyError(ControllerError):

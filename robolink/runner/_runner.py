@@ -226,17 +226,15 @@ class Runner:
         finally:
             procedure.close()
 
-    def move(self, target: Pose, path: Path, *, by_hand: bool = False) -> Pose:
+    def move(self, target: Pose, path: Path) -> Pose:
         """Move once and return where the frame is then.
-
-        Args:
-            target: Where to.
-            path: How.
-            by_hand: Whether it is a step that a person asked for just now.
 
         Raises:
             StoppedError: It was stopped before it arrived.
         """
+        return self._move(target, path, by_hand=False)
+
+    def _move(self, target: Pose, path: Path, *, by_hand: bool) -> Pose:
         profile = MotionProfile(path, self._settings.speed_percent, self._settings.speed_mm_s)
 
         def go() -> MotionOutcome:
@@ -264,7 +262,7 @@ class Runner:
         """
         before = self._group.pose()
         target, path = jog_target(before, steps, self._settings)
-        after = self.move(target, path, by_hand=True)
+        after = self._move(target, path, by_hand=True)
         if self._guided is not None:
             longest = max(map(abs, parse_steps(steps).values()))
             self._guided.regard(JogSubject(before, after, longest))
@@ -378,8 +376,7 @@ class Runner:
     def _seen_through(self, go: Callable[[], T], target: Pose, *, by_hand: bool = False) -> T:
         """Move when all permits are given; again from here if this computer was too busy to.
 
-        The controller has ended the movement, so that what follows is another one, to the same
-        place; a person decides on it, a bounded number of times.
+        The controller has ended the movement: a person decides on another, a few times at most.
         """
         while True:
             try:

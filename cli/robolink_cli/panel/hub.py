@@ -20,7 +20,7 @@ from robolink_cli.console.output import show
 from robolink_cli.panel.cards import CellCard, JobOffer
 from robolink_cli.panel.jobs import KINDS, Job, JobKind
 from robolink_cli.panel.pages import Pages, Parts, Watcher
-from robolink_cli.panel.watch import CellWatch, Standing, card_of, standing_of
+from robolink_cli.panel.watch import AT_ONCE, CellWatch, Standing, card_of, standing_of
 from robolink_cli.panel.words import speaking_in
 from robolink_cli.wizard.views.records import MovingView, View
 
@@ -85,12 +85,15 @@ class Board:
     Args:
         cell: The cell.
         changed: Called with it when there is something new to show.
+        slots: Taken for a look, of all cells together.
     """
 
-    def __init__(self, cell: PanelCell, changed: "Callable[[Board], None]") -> None:
+    def __init__(
+        self, cell: PanelCell, changed: "Callable[[Board], None]", slots: asyncio.Semaphore
+    ) -> None:
         self.cell = cell
         self._changed = changed
-        self.watch = CellWatch(cell.name, cell.url, cell.watch_s, self.renew)
+        self.watch = CellWatch(cell.name, cell.url, cell.watch_s, self.renew, slots)
         self.standing = Standing()
         self.job: Job | None = None
         self.said: tuple[str, ...] = ()
@@ -254,7 +257,8 @@ class Hub:
         seats: SeatTable,
         note: Callable[..., None],
     ) -> None:
-        self.boards = {cell.name: Board(cell, self._changed) for cell in cells}
+        slots = asyncio.Semaphore(AT_ONCE)
+        self.boards = {cell.name: Board(cell, self._changed, slots) for cell in cells}
         self.pages = pages
         self._seats = seats
         self._note = note

@@ -28,6 +28,9 @@ MOST_BYTES: Final = 64 * 1024
 _MOST_UNSENT: Final = 16 * 1024
 """Bytes that a job has not taken yet, from which beats and signs of life are left out."""
 
+_IN_ORDER: Final = range(70)
+"""Exit codes of a command that ended in order; 70 is for a bug."""
+
 _MOST_TOLD: Final = 20
 _MOST_ERRORS: Final = 4096
 
@@ -122,6 +125,7 @@ class Job:
         self.told: deque[str] = deque(maxlen=_MOST_TOLD)
         self.end: JobEnd | None = None
         self._left: JobEnd | None = None
+        self._leaves = False
         self._errors = b""
         self._process: asyncio.subprocess.Process | None = None
         self._writer: asyncio.StreamWriter | None = None
@@ -188,6 +192,7 @@ class Job:
 
     def leave(self) -> None:
         """End it in order, as a closed terminal does."""
+        self._leaves = True
         self._send({"t": "leave"})
 
     async def close(self, wait_s: float) -> bool:
@@ -232,7 +237,9 @@ class Job:
         await process.wait()
         await errors
         text = self._errors.decode(errors="replace").strip()
-        self.end = self._left or JobEnd(None, tuple(self.told), text)
+        # Who was told that nobody is there says nothing more; its exit code tells how it ended.
+        code = process.returncode if self._leaves and process.returncode in _IN_ORDER else None
+        self.end = self._left or JobEnd(code, tuple(self.told), text)
         self._changed()
 
     async def _keep_errors(self, stream: asyncio.StreamReader) -> None:

@@ -37,12 +37,14 @@ class Place:
         host: Address or name of this computer.
         port: 0 for any that is free.
         certificate, key: Files of TLS; empty for none.
+        name: What a browser calls it; empty for ``host``.
     """
 
     host: str
     port: int
     certificate: str = ""
     key: str = ""
+    name: str = ""
 
     def context(self, *_: object) -> ssl.SSLContext:
         """Return what TLS takes of the certificate."""
@@ -53,7 +55,8 @@ class Place:
     def url(self, port: int) -> str:
         """Return what is opened in a browser."""
         scheme = "https" if self.certificate else "http"
-        host = f"[{self.host}]" if ":" in self.host else self.host
+        name = self.name or self.host
+        host = f"[{name}]" if ":" in name else name
         return f"{scheme}://{host}:{port}/"
 
 

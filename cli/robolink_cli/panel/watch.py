@@ -40,7 +40,7 @@ NO_ANSWER: Final = declared("The cell did not answer.")
 _LONGEST_S: Final = 20.0
 """Longest wait in s for the end of a look."""
 
-_AT_ONCE: Final = 2
+AT_ONCE: Final = 2
 """Number of looks at the same time: each is a process."""
 
 
@@ -128,18 +128,23 @@ class CellWatch:
         url: Its controller.
         every_s: How often it is looked at; ``None`` for only when a page is opened.
         changed: Called when there is something new to show.
+        slots: Taken for a look, of all cells together.
 
     Attributes:
         look: What was seen last; ``None`` before the first look.
         looking: Whether a look is under way.
     """
 
-    _slots: asyncio.Semaphore | None = None
-
     def __init__(
-        self, cell: str, url: str, every_s: float | None, changed: Callable[[], None]
+        self,
+        cell: str,
+        url: str,
+        every_s: float | None,
+        changed: Callable[[], None],
+        slots: asyncio.Semaphore,
     ) -> None:
         self.cell, self.url, self.every_s = cell, url, every_s
+        self._slots = slots
         self._changed = changed
         self.look: Look | None = None
         self.looking = False
@@ -163,10 +168,8 @@ class CellWatch:
         if self.looking:
             return
         self.looking = True
-        if CellWatch._slots is None:
-            CellWatch._slots = asyncio.Semaphore(_AT_ONCE)
         try:
-            async with CellWatch._slots:
+            async with self._slots:
                 self.look = await _looked(self.cell)
         finally:
             self.looking = False

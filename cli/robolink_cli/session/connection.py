@@ -106,7 +106,7 @@ def open_controller(
         remember_address(context)
         with (
             watched_at_desk(controller),
-            asking_for_permits(controller, context.cell),
+            asking_for_permits(controller, url, context.cell),
             listening_for_stop(controller, context, looks=unhindered),
             _saying_what_is_left(
                 controller, context, quiet=quiet, looks=looks, calms=calms, leaves=leaves

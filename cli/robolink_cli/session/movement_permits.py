@@ -24,12 +24,13 @@ _LOOK_S: Final = 0.1
 
 
 def asking_for_permits(
-    controller: "Controller", cell: "Cell | None"
+    controller: "Controller", url: str, cell: "Cell | None"
 ) -> "AbstractContextManager[None]":
     """Let each movement wait for what the cell and the page ask for, for the block.
 
     Args:
         controller: The controller, connected.
+        url: How it was reached.
         cell: What the cell files say; ``None`` where no cell was named.
     """
     enable = None if cell is None else cell.settings.enable_input
@@ -39,7 +40,7 @@ def asking_for_permits(
     from robolink.runner import permitted_by  # numpy is near, and a look needs none
 
     stop_s = None if cell is None else cell.settings.stop_on_silence_s
-    return permitted_by(controller, CellPermit(controller, enable, desk, stop_s))
+    return permitted_by(controller, CellPermit(controller, url, enable, desk, stop_s))
 
 
 class CellPermit:
@@ -50,6 +51,7 @@ class CellPermit:
 
     Args:
         controller: The controller.
+        url: How it was reached.
         enable: Number of the input that has to be on; ``None`` for none.
         desk: Where a person is asked; ``None`` where nobody is.
         stop_s: For how long the page may be silent during a movement; ``None`` for any time.
@@ -58,11 +60,13 @@ class CellPermit:
     def __init__(
         self,
         controller: "Controller",
+        url: str,
         enable: int | None,
         desk: "AskingDesk | None",
         stop_s: float | None,
     ) -> None:
         self._controller = controller
+        self._url = url
         self._enable = enable
         self._desk = desk
         self._stop_s = stop_s
@@ -116,8 +120,24 @@ class CellPermit:
         while not over.wait(_LOOK_S):
             if desk.silent_s() <= stop_s:
                 continue
+            confirmed = False
             try:
                 self._controller.stop()
+                confirmed = True
             except RobolinkError as error:
                 desk.tell(error.what)
+            self._leave_note(desk, confirmed=confirmed)
             return
+
+    def _leave_note(self, desk: "AskingDesk", *, confirmed: bool) -> None:
+        """Let the next command ask about this stop, like one from another terminal."""
+        from robolink.stopping import leave_note
+        from robolink.transport import far_end_of
+        from robolink_cli.stopping.notes import own_name_of
+
+        who = tr("a page that was not heard any more")
+        name, told = own_name_of(self._controller), self._url.partition("?")[0]
+        try:
+            leave_note(far_end_of(self._url), told, who, confirmed=confirmed, controller=name)
+        except OSError as error:
+            desk.tell(str(error))

@@ -93,17 +93,17 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
     )
     if not begun or left or state.free_jog is not None or not isinstance(error, RobolinkError):
         return None
-    headed = _headed(state, error)
+    headed = headed_of(state, error)
     kept = (_head(state, headed), *_where(state), *_next(state, error))
     said = tuple(stopped_lines(state, error))
-    blocked = _is_blocked(error)
+    blocked = is_blocked(error)
     return LastScreen(False, said, kept, at_s, headed, again=not blocked, blocked=blocked)
 
 
 def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
     """Return why it ended, where, what stands on the controller, and the next command."""
     outcome = outcome_after(error)
-    blocked = _is_blocked(error)
+    blocked = is_blocked(error)
     stands = "" if outcome is UNTOUCHED else describe_outcome(outcome, settles=not blocked)
     # The sentence about the outcome already says that nothing was written.
     remedy = "" if error.remedy in stands else error.remedy
@@ -119,14 +119,14 @@ def kept_lines(state: WizardState, error: BaseException | None) -> list[str]:
         return []
     if state.subject is None:
         return []
-    return [_head(state, _headed(state, error)), *_where(state)]
+    return [_head(state, headed_of(state, error)), *_where(state)]
 
 
 def _head(state: WizardState, ended: str) -> str:
     return f"{state.header.cell}   {state.header.job}   {ended}"
 
 
-def _headed(state: WizardState, error: BaseException) -> str:
+def headed_of(state: WizardState, error: BaseException) -> str:
     """Return whether a job was stopped, or was refused before anything happened."""
     measured = state.touch is not None or isinstance(error, (CalibrationError, VerifyError))
     if was_refused(error) and not measured and outcome_after(error).untouched:
@@ -134,7 +134,7 @@ def _headed(state: WizardState, error: BaseException) -> str:
     return tr("STOPPED")
 
 
-def _is_blocked(error: RobolinkError) -> bool:
+def is_blocked(error: RobolinkError) -> bool:
     """Return whether the robot accepts only ``recover``, and what comes before it."""
     return outcome_after(error).left_open or isinstance(error, OutcomeUnknownError)
 
@@ -153,7 +153,7 @@ def _next(state: WizardState, error: RobolinkError) -> list[str]:
     measured, ended it.
     """
     outcome = outcome_after(error)
-    if _is_blocked(error):
+    if is_blocked(error):
         back = way_back(state.header.cell, reset_first=outcome.reset_first)
         line = tr("Next: {command}", command=back)
         return [next_of(line, error, outcome, state.header.command.split())]

@@ -103,7 +103,7 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
 
 
 def answered_by_press(state: WizardState, press: Pressed) -> Answered:
-    """Return the answer of a press that is offered (:func:`~.views.offered.refusal`)."""
+    """Return the answer of a press that the view offers; see ``views.offered``."""
     subject = state.subject
     match press.action, subject:
         case "choose", _:

@@ -14,6 +14,7 @@ from robolink.errors import DeclinedError, RobolinkError
 from robolink.interrupts import heard_by_this_thread, heed
 from robolink.messages import tr
 from robolink.runner import MoveSubject, Question
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.wizard.happenings import (
     Happening,
     Reading,
@@ -121,6 +122,11 @@ class Desk:
             self.tell(tr("The robot goes on."))
 
     def _require_somebody(self) -> None:
+        if self._gone and person_here() is Person.WIRE:
+            raise DeclinedError(
+                tr("The panel is gone. Nothing was answered for you."),
+                remedy=tr("Start the job again from its page."),
+            )
         if self._gone:
             raise DeclinedError(
                 tr("The keyboard is gone. Nothing was answered for you."),

@@ -119,6 +119,15 @@ def test_they_count_for_the_address_with_every_name(panel):
     assert panel.browser().load().log_in(MEI).status == 200
 
 
+def test_a_name_that_was_only_typed_is_not_on_record_as_who_it_was(panel):
+    panel.browser().load().log_in(MEI, WRONG)
+    (facts,) = [facts for kind, _, facts in panel.notes.kept if kind == "refused"]
+    assert "who" not in facts
+    assert (facts["typed_name"], facts["why"]) == (MEI, "pin")
+    panel.browser().load().log_in(MEI)
+    assert panel.notes.kept[-1][2]["who"] == MEI
+
+
 def test_an_address_is_not_what_a_header_says(panel):
     for number in range(5):
         headers = {"X-Forwarded-For": f"10.0.0.{number}"}

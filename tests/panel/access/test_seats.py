@@ -1,14 +1,14 @@
 """A second tablet: it watches, it reads who has the seat, and it never commands."""
 
 import pytest
-from robolink_cli.panel.guard.pairing import Session, Tablet
+from robolink_cli.panel.guard.pairing import LoggedIn, Tablet
 from robolink_cli.panel.guard.seat import SILENCE_S, Seats
 
 from tests.panel.access._bare import CELL, JON, MEI, Clock
 
 
 def tablet(name, who=""):
-    return Tablet(name, f"10.0.0.{ord(name[0])}", paired=True, session=Session(who, "operator", 0))
+    return Tablet(name, f"10.0.0.{ord(name[0])}", paired=True, session=LoggedIn(who, "operator", 0))
 
 
 A, B = tablet("a", MEI), tablet("b", JON)

@@ -13,7 +13,7 @@ from robolink_cli.wizard.views.records import (
     Arrow,
     CheckRow,
     CheckView,
-    ChoiceRow,
+    ListRow,
     ChoiceView,
     CoordinateRow,
     EndView,
@@ -80,14 +80,14 @@ def _english():
                 ("Controller EPSON RC90-B, serial 0815; tool 1 is selected.",),
                 "Which job?",
                 (
-                    ChoiceRow(
+                    ListRow(
                         "Needle 22G on the pin", "1", ("last done 26 Nov, Chen; about 4 min",)
                     ),
-                    ChoiceRow(
+                    ListRow(
                         "One touch", "2", ("full calibration due in 3 changes; about 1 min",)
                     ),
-                    ChoiceRow("Two nozzles", "3", ("never done here",)),
-                    ChoiceRow("Find station PIN-07 again", "4", ("engineers only",)),
+                    ListRow("Two nozzles", "3", ("never done here",)),
+                    ListRow("Find station PIN-07 again", "4", ("engineers only",)),
                 ),
                 0,
                 "Open",
@@ -158,7 +158,7 @@ def _english():
             head("Touch 1 of 2", 4),
             TouchView(
                 ("Jog the tip onto the pin.",),
-                "Flange",
+                "Flange now",
                 (
                     CoordinateRow("X", "153.184", "-5.416"),
                     CoordinateRow("Y", "501.218", "+5.818"),
@@ -263,7 +263,7 @@ def _english():
                     "Jog the tip onto the pin again. robolink measures how far off it was.",
                     "Limit 0.200 mm. If it is off by more, robolink writes the old value back.",
                 ),
-                "Flange",
+                "Flange now",
                 (
                     CoordinateRow("X", "165.684", "+0.016"),
                     CoordinateRow("Y", "482.918", "-0.011"),

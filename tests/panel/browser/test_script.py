@@ -4,7 +4,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from robolink_cli.wizard.views.records import ChoiceRow, QuestionView, Weight
+from robolink_cli.wizard.views.records import ListRow, QuestionView, Weight
 
 from tests.panel.browser import samples
 from tests.panel.browser.fingers import Fingers
@@ -90,6 +90,23 @@ def test_a_finger_that_slides_off_presses_nothing(panel, page, fingers):
     fingers.move(x, y - 300)
     fingers.move(x, y)
     fingers.up()
+    assert still(panel) == []
+
+
+def test_a_finger_that_slides_over_a_page_leads_nowhere(panel, page, fingers):
+    """A browser takes it for Back where it may."""
+    panel.documents["/before"] = "<!DOCTYPE html><title>before</title>"
+    page.goto(panel.url.replace("/cell/line3", "/before"))
+    page.goto(panel.url)
+    alive(page)
+    for y in (60, 400, 760):
+        for start, end in ((200, 1200), (1200, 200), (640, 1270)):
+            fingers.down((start, y))
+            for step in range(1, 9):
+                fingers.move(start + (end - start) * step / 8, y)
+            fingers.up()
+    time.sleep(1.0)
+    assert page.url == panel.url
     assert still(panel) == []
 
 
@@ -181,7 +198,7 @@ def test_a_scanner_types_and_enter_answers(panel, page):
 
 def test_a_list_that_is_too_long_says_so_and_can_be_read_to_its_end(panel, page, fingers):
     view = samples.views("en")["choice"]
-    rows = tuple(ChoiceRow(f"Job {n}", str(n), ("what it does",)) for n in range(20))
+    rows = tuple(ListRow(f"Job {n}", str(n), ("what it does",)) for n in range(20))
     panel.show(replace(view, body=replace(view.body, rows=rows)))
     for _ in range(4):
         page.wait_for_selector("#more:visible")

@@ -152,10 +152,12 @@ class Hand:
 
     def tap(self, value):
         """Tap one step, and wait for its end."""
-        before = self.tablet.view.body.way
+        before = self.tablet.view.body.rows
         self.tablet.press("jog", value)
         self.tablet.see(
-            lambda view: view.waits and isinstance(view.body, TouchView) and view.body.way != before
+            lambda view: (
+                view.waits and isinstance(view.body, TouchView) and view.body.rows != before
+            )
         )
 
     def bring(self):

@@ -13,10 +13,10 @@ LEARN = ["calibrate", "n-angle", "--tool", "1", "--station", "PIN-07", "--yes"]
 
 
 @pytest.fixture
-def robot(tmp_path, monkeypatch):
-    """A simulated robot: the simulator, its clock and its URL."""
+def robot(tmp_path, monkeypatch, request):
+    """A simulated robot: the simulator, its clock and its URL; it is fast unless a test says so."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    simulator, clock = EpsonSimulator(seed=7), ScaledClock(30.0)
+    simulator, clock = EpsonSimulator(seed=7), ScaledClock(getattr(request, "param", 30.0))
     with serve_tcp(simulator, clock=clock) as host:
         yield simulator, clock, host.url
 

@@ -182,7 +182,7 @@ def beat_for(tablet, seconds, finger="f1"):
 
 def test_a_held_key_steps_while_it_beats_and_makes_one_step_at_most_after_any_loss(robot):
     simulator, *_ = robot
-    after = {}
+    after: dict[str, tuple[int, int]] = {}
 
     def lost(name, tablet, how):
         finger = f"finger {name}"

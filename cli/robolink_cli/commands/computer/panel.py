@@ -160,7 +160,8 @@ def _place(
             remedy=tr("Run 'robolink panel cert', or give --tls-cert and --tls-key."),
         )
     found = tls.load(path, own_key)
-    return Place(host, port, str(found.path), str(found.key)), found.names
+    name = found.names[0].replace("*", "panel") if host in ("0.0.0.0", "::") else ""
+    return Place(host, port, str(found.path), str(found.key), name), found.names
 
 
 def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":

@@ -171,7 +171,7 @@ def _of_file(file: Path) -> Secret:
         return Secret(lines[0].decode("ascii").strip() if lines else "")
     except OthersMayReadError as error:
         raise ConfigError(
-            tr("Other users may read the file {path}.", path=file),
+            tr("Others than its owner can read {path}.", path=file),
             remedy=tr("Run: chmod 600 {path}", path=file),
         ) from error
     except UnicodeError:

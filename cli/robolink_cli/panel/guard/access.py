@@ -28,7 +28,7 @@ from robolink_cli.panel.guard.pairing import (
     tablet_id,
 )
 from robolink_cli.panel.guard.people import NOBODY, Pins, Tries, address_key, name_key
-from robolink_cli.panel.guard.requests import MOST_BYTES, Refusal, Request
+from robolink_cli.panel.guard.requests import MOST_BYTES, Denial, PageRequest
 from robolink_cli.panel.guard.seat import Seats
 
 COMMANDS_A_SECOND: Final = 20.0
@@ -200,7 +200,7 @@ class Access:
         visit: Visit = scope[_VISIT]
         return hmac.new(self._key, visit.tablet.encode(), sha256).hexdigest()
 
-    def visit(self, request: Request) -> Visit:
+    def visit(self, request: PageRequest) -> Visit:
         """Return what a request carries of its tablet, and keep it for :meth:`tablet_of`."""
         secrets = [one for one in request.cookies(self.cookie_name("tablet")) if is_secret(one)]
         known = [one for one in secrets if self.tablets.holds(tablet_id(one))]
@@ -309,7 +309,7 @@ class Access:
 
     # ---- PINs
 
-    async def prove(self, who: str, pin: str, visit: Visit) -> Refusal | None:
+    async def prove(self, who: str, pin: str, visit: Visit) -> Denial | None:
         """Look at a PIN; wrong ones count for the person and for the address.
 
         Args:
@@ -321,34 +321,34 @@ class Access:
             Why it does not count; ``None`` where it does.
         """
         if self._proofs >= _MOST_PROOFS:
-            return Refusal(503, tr("Too many people are logging in. Try again."), "busy", 1.0)
+            return Denial(503, tr("Too many people are logging in. Try again."), "busy", 1.0)
         self._proofs += 1
         try:
             loop = asyncio.get_running_loop()
             refusal = await loop.run_in_executor(self._one_by_one, self._proved, who, pin, visit)
         finally:
             self._proofs -= 1
-        return refusal and Refusal(
+        return refusal and Denial(
             refusal.status, refusal.why or _pause(refusal.wait_s), refusal.kind, refusal.wait_s
         )
 
-    def _proved(self, who: str, pin: str, visit: Visit) -> Refusal | None:
+    def _proved(self, who: str, pin: str, visit: Visit) -> Denial | None:
         keys = [address_key(visit.address)]
         if self.highest_role(who) is not None and self.pins.mark(who):
             keys.append(name_key(who))
         if pause_s := self.tries.pause_s(*keys):
-            return Refusal(429, "", "pause", pause_s)
+            return Denial(429, "", "pause", pause_s)
         try:
             self.tries.count(*keys)
         except OSError:
             why = tr("The panel's computer cannot store that a PIN was tried, so it looks at none.")
-            return Refusal(503, why, "disk")
+            return Denial(503, why, "disk")
         if self.pins.matches(who, pin) and self.highest_role(who) is not None:
             self.tries.forgive(*keys)
             return None
         if pause_s := self.tries.pause_s(*keys):
-            return Refusal(403, "", "pin", pause_s)
-        return Refusal(403, tr("This is not the PIN."), "pin")
+            return Denial(403, "", "pin", pause_s)
+        return Denial(403, tr("This is not the PIN."), "pin")
 
     # ---- Rates
 

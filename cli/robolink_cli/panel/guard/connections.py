@@ -56,7 +56,7 @@ def network_of(address: str) -> str:
 
 
 @dataclass(eq=False, slots=True)
-class Connection:
+class TabletConnection:
     """One connection.
 
     Attributes:
@@ -83,7 +83,7 @@ class Connections:
     """
 
     refused: int = 0
-    _open: dict[Peer, Connection] = field(default_factory=dict)
+    _open: dict[Peer, TabletConnection] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return how many there are."""
@@ -94,7 +94,7 @@ class Connections:
         """How many of them are strangers."""
         return sum(1 for connection in self._open.values() if connection.tablet is None)
 
-    def came(self, peer: Peer, close: Callable[[], None]) -> "Connection | None":
+    def came(self, peer: Peer, close: Callable[[], None]) -> "TabletConnection | None":
         """Take a new connection in, ``None`` where it has no place; another may make room.
 
         Args:
@@ -113,7 +113,7 @@ class Connections:
                     self.refused += 1
                     return None
             self._drop(oldest)
-        connection = Connection(peer, source, close, now_s)
+        connection = TabletConnection(peer, source, close, now_s)
         self._open[peer] = connection
         return connection
 
@@ -133,12 +133,12 @@ class Connections:
         connection.tablet = tablet
         return True
 
-    def went(self, connection: "Connection") -> None:
+    def went(self, connection: "TabletConnection") -> None:
         """Note that a connection has ended; its far end may be another's by now."""
         if self._open.get(connection.peer) is connection:
             del self._open[connection.peer]
 
-    def expire(self, connection: "Connection") -> None:
+    def expire(self, connection: "TabletConnection") -> None:
         """Close a connection that is a stranger still."""
         if connection.tablet is None and self._open.get(connection.peer) is connection:
             self._drop(connection)
@@ -149,7 +149,7 @@ class Connections:
         if connection is not None:
             self._drop(connection)
 
-    def _drop(self, connection: "Connection") -> None:
+    def _drop(self, connection: "TabletConnection") -> None:
         self.refused += 1
         self._open.pop(connection.peer, None)
         connection.close()

@@ -16,7 +16,7 @@ from robolink.model import PersonRole
 from robolink_cli.panel.guard.access import COMMANDS_A_SECOND, Access, Visit
 from robolink_cli.panel.guard.live import Live, Lives
 from robolink_cli.panel.guard.pairing import tablet_id
-from robolink_cli.panel.guard.requests import MOST_BYTES, Refusal, Request, parsed
+from robolink_cli.panel.guard.requests import MOST_BYTES, Denial, PageRequest, parsed
 
 Message = MutableMapping[str, Any]
 Scope = MutableMapping[str, Any]
@@ -56,7 +56,7 @@ _HEADERS: Final = {
 _NEVER: Final = (b"access-control-", b"server")
 
 
-class Need(Enum):
+class Right(Enum):
     """What a request needs besides a page of ours."""
 
     STOP = auto()
@@ -72,15 +72,15 @@ class Need(Enum):
 
 
 POSTS: Final = {
-    "/stop": Need.STOP,
-    "/stop-all": Need.STOP,
-    "/pair": Need.PIN,
-    "/login": Need.PIN,
-    "/logout": Need.TOKEN,
-    "/tablet": Need.TOKEN,
-    "/seat": Need.PERSON,
-    "/seat/leave": Need.TOKEN,
-    "/start": Need.COMMAND,
+    "/stop": Right.STOP,
+    "/stop-all": Right.STOP,
+    "/pair": Right.PIN,
+    "/login": Right.PIN,
+    "/logout": Right.TOKEN,
+    "/tablet": Right.TOKEN,
+    "/seat": Right.PERSON,
+    "/seat/leave": Right.TOKEN,
+    "/start": Right.COMMAND,
 }
 """All that can be posted; what is not here there is not."""
 
@@ -109,7 +109,7 @@ class _Gate:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        request = Request(scope)
+        request = PageRequest(scope)
         visit = self._access.visit(request)
         with self._access.speaking(visit.tablet):
             if request.live:
@@ -120,7 +120,7 @@ class _Gate:
                 )
 
     async def _http(
-        self, request: Request, visit: Visit, receive: Receive, answer: "_Answer"
+        self, request: PageRequest, visit: Visit, receive: Receive, answer: "_Answer"
     ) -> None:
         access = self._access
         refusal = request.misdirected(access.hosts, access.port)
@@ -136,14 +136,14 @@ class _Gate:
                 await self._app(request.scope, receive, answer)
                 return
         elif refusal is None and request.method != "POST":
-            refusal = Refusal(405, tr("There is no such page."), "method")
+            refusal = Denial(405, tr("There is no such page."), "method")
         if refusal is not None:
             await self._refused(refusal, request, visit, answer)
             return
         await self._post(request, visit, receive, answer)
 
     async def _post(
-        self, request: Request, visit: Visit, receive: Receive, answer: "_Answer"
+        self, request: PageRequest, visit: Visit, receive: Receive, answer: "_Answer"
     ) -> None:
         need = POSTS.get(request.path)
         body, refusal = b"", self._head_of_post(request, visit, need)
@@ -151,8 +151,8 @@ class _Gate:
             body, refusal = await _body(request, receive)
         document = parsed(body) if refusal is None else None
         if refusal is None and document is None:
-            refusal = Refusal(400, tr("This is no JSON object."), "form")
-        if refusal is None and document is not None and need in (Need.PERSON, Need.COMMAND):
+            refusal = Denial(400, tr("The panel does not understand this message."), "form")
+        if refusal is None and document is not None and need in (Right.PERSON, Right.COMMAND):
             refusal = self._command(request, document.get("cell"), need)
         if refusal is not None or document is None:
             assert refusal is not None  # noqa: S101 - just above
@@ -164,54 +164,58 @@ class _Gate:
         else:
             await self._app(request.scope, _replayed(body, receive), answer)
 
-    def _head_of_post(self, request: Request, visit: Visit, need: Need | None) -> Refusal | None:
+    def _head_of_post(
+        self, request: PageRequest, visit: Visit, need: Right | None
+    ) -> Denial | None:
         """Refuse by what stands before the body."""
         access = self._access
         if need is None:
-            return Refusal(404, tr("There is no such page."), "path")
+            return Denial(404, tr("There is no such page."), "path")
         # The browsers that do not say Sec-Fetch-Site must be able to stop all the same.
-        if refusal := request.foreign(strict=need is not Need.STOP):
+        if refusal := request.foreign(strict=need is not Right.STOP):
             return refusal
         kind = (request.one(b"content-type") or "").partition(";")[0].strip().lower()
         if kind != "application/json" or request.scope["query_string"]:
-            return Refusal(415, tr("This is no JSON object."), "form")
+            return Denial(415, tr("The panel does not understand this message."), "form")
         paired = access.is_paired(visit.tablet)
         if paired and (refusal := self._place(visit)):
             return refusal
-        if need is Need.STOP:
+        if need is Right.STOP:
             return None if paired else _unpaired()
         if access.too_often(visit, "commands", COMMANDS_A_SECOND):
-            return Refusal(429, tr("Too many commands. Nothing was done."), "rate", 1.0)
-        if need is Need.PIN:
+            return Denial(429, tr("Too many commands. Nothing was done."), "rate", 1.0)
+        if need is Right.PIN:
             return None if paired or request.path == PAIRING else _unpaired()
         if not paired:
             return _unpaired()
         token = access.token_of(request.scope)
         if not _same(request.one(b"x-robolink-token"), token):
-            return Refusal(403, tr("This page is out of date. Load it again."), "token")
+            return Denial(403, tr("This page is out of date. Load it again."), "token")
         return None
 
-    def _command(self, request: Request, cell: object, need: Need) -> Refusal | None:
+    def _command(self, request: PageRequest, cell: object, need: Right) -> Denial | None:
         access = self._access
         if not isinstance(cell, str):
-            return Refusal(400, tr("This is no JSON object."), "form")
+            return Denial(400, tr("The panel does not understand this message."), "form")
         tablet = access.tablet_of(request.scope)
-        if why := access.why_not(tablet, cell, young=need is Need.COMMAND):
-            return Refusal(403, why, "person")
-        if need is Need.COMMAND and not access.seats.has(cell, tablet.id):
-            return Refusal(409, tr("Take the seat of this cell first."), "seat")
+        if why := access.why_not(tablet, cell, young=need is Right.COMMAND):
+            return Denial(403, why, "person")
+        if need is Right.COMMAND and not access.seats.has(cell, tablet.id):
+            return Denial(409, tr("Take the seat of this cell first."), "seat")
         return None
 
     # ---- Logging in
 
     async def _with_pin(
-        self, request: Request, visit: Visit, document: dict[str, Any], answer: "_Answer"
+        self, request: PageRequest, visit: Visit, document: dict[str, Any], answer: "_Answer"
     ) -> None:
         """Pair a tablet, or log a person in."""
         access, pairs = self._access, request.path == PAIRING
         who, pin = document.get("name"), document.get("pin")
         if not (isinstance(who, str) and isinstance(pin, str)) or len(who + pin) > _MOST_TYPED:
-            refusal: Refusal | None = Refusal(400, tr("This is no JSON object."), "form")
+            refusal: Denial | None = Denial(
+                400, tr("The panel does not understand this message."), "form"
+            )
         else:
             refusal = await access.prove(who, pin, visit)
         if refusal is not None:
@@ -221,7 +225,7 @@ class _Gate:
         role = access.highest_role(who)
         if pairs and role is not PersonRole.ENGINEER:
             why = tr("Pairing a tablet takes an engineer.")
-            await self._refused(Refusal(403, why, "role"), request, visit, answer, who=who)
+            await self._refused(Denial(403, why, "role"), request, visit, answer, who=who)
             return
         tablet, facts = visit.tablet, {"who": who, "address": visit.address}
         cookies = []
@@ -230,7 +234,7 @@ class _Gate:
                 secret = access.tablets.pair(who, visit.address)
             except OSError:
                 why = tr("The panel's computer cannot store that this tablet is paired.")
-                await self._refused(Refusal(503, why, "disk"), request, visit, answer, who=who)
+                await self._refused(Denial(503, why, "disk"), request, visit, answer, who=who)
                 return
             tablet = tablet_id(secret)
             cookies.append(access.cookie("tablet", secret))
@@ -251,11 +255,11 @@ class _Gate:
 
     # ---- Live
 
-    async def _live(self, request: Request, visit: Visit, receive: Receive, send: Send) -> None:
+    async def _live(self, request: PageRequest, visit: Visit, receive: Receive, send: Send) -> None:
         access = self._access
         refusal = request.misdirected(access.hosts, access.port) or request.foreign(strict=False)
         if refusal is None and request.path != LIVE:
-            refusal = Refusal(404, tr("There is no such page."), "path")
+            refusal = Denial(404, tr("There is no such page."), "path")
         if refusal is None and not access.is_paired(visit.tablet):
             refusal = _unpaired()
         refusal = refusal or self._place(visit)
@@ -272,16 +276,16 @@ class _Gate:
 
     # ---- Refusing
 
-    def _place(self, visit: Visit) -> Refusal | None:
+    def _place(self, visit: Visit) -> Denial | None:
         if self._access.connections.let_in(visit.peer, visit.tablet):
             return None
         why = tr("Too many pages of this panel are open. Close one.")
-        return Refusal(503, why, "connections", 1.0)
+        return Denial(503, why, "connections", 1.0)
 
     async def _refused(
         self,
-        refusal: Refusal,
-        request: Request,
+        refusal: Denial,
+        request: PageRequest,
         visit: Visit,
         answer: "_Answer",
         who: object = None,
@@ -290,11 +294,11 @@ class _Gate:
         await answer.refusal(refusal)
 
     def _on_record(
-        self, refusal: Refusal, request: Request, visit: Visit, who: object = None
+        self, refusal: Denial, request: PageRequest, visit: Visit, who: object = None
     ) -> None:
         facts: dict[str, object] = {"address": visit.address, "path": request.path[:100]}
         if isinstance(who, str):
-            facts["who"] = who[:100]
+            facts["typed_name"] = who[:100]  # of whom nobody knows whether it is true
         self._access.audit.note("refused", "", why=refusal.kind, **facts)
 
 
@@ -303,7 +307,7 @@ class _Answer:
     """What goes out: with the headers of every answer, in time, and nothing after a cut."""
 
     access: Access
-    request: Request
+    request: PageRequest
     visit: Visit
     send: Send
 
@@ -321,7 +325,7 @@ class _Answer:
         """Answer with JSON."""
         await self._whole(status, json.dumps(said).encode(), b"application/json", cookies)
 
-    async def refusal(self, refusal: Refusal) -> None:
+    async def refusal(self, refusal: Denial) -> None:
         """Answer with a refusal: JSON for a script, text for a page."""
         wait = (("retry-after", str(int(refusal.wait_s) + 1)),) if refusal.wait_s else ()
         if self.request.method == "POST":
@@ -374,9 +378,9 @@ class _Answer:
         return [*kept, *headers.items()]
 
 
-async def _body(request: Request, receive: Receive) -> tuple[bytes, Refusal | None]:
+async def _body(request: PageRequest, receive: Receive) -> tuple[bytes, Denial | None]:
     """Read a whole body; a short one, in time."""
-    too_long = Refusal(413, tr("The message is too long."), "length")
+    too_long = Denial(413, tr("The message is too long."), "length")
     said = request.all(b"content-length")
     if said and (len(said) > 1 or not said[0].isdigit() or int(said[0]) > MOST_BYTES):
         return b"", too_long
@@ -386,14 +390,14 @@ async def _body(request: Request, receive: Receive) -> tuple[bytes, Refusal | No
             while True:
                 message = await receive()
                 if message["type"] != "http.request":
-                    return b"", Refusal(400, tr("The message is not whole."), "form")
+                    return b"", Denial(400, tr("The message is not whole."), "form")
                 body += message.get("body", b"")
                 if len(body) > MOST_BYTES:
                     return b"", too_long
                 if not message.get("more_body", False):
                     return body, None
     except TimeoutError:
-        return b"", Refusal(408, tr("The message did not come in time."), "slow")
+        return b"", Denial(408, tr("The whole message took too long."), "slow")
 
 
 def _replayed(body: bytes, receive: Receive) -> Receive:
@@ -406,8 +410,8 @@ def _replayed(body: bytes, receive: Receive) -> Receive:
     return again
 
 
-def _unpaired() -> Refusal:
-    return Refusal(403, tr("This tablet is not paired with the panel."), "unpaired")
+def _unpaired() -> Denial:
+    return Denial(403, tr("This tablet is not paired with the panel."), "unpaired")
 
 
 def _same(given: str | None, token: str) -> bool:

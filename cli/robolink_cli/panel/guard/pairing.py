@@ -31,7 +31,7 @@ _SHOWN: Final = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
+class LoggedIn:
     """A login.
 
     Attributes:
@@ -60,7 +60,7 @@ class Tablet:
     id: str
     address: str
     paired: bool
-    session: Session | None = None
+    session: LoggedIn | None = None
 
     @property
     def who(self) -> str:
@@ -167,7 +167,7 @@ class PairedTablets:
 
 @dataclass(slots=True)
 class _Login:
-    session: Session
+    session: LoggedIn
     tablet: str
     mark: str
     """Of the PIN; another one ends the login."""
@@ -198,7 +198,7 @@ class Logins:
         while len(self._open) >= _MOST_LOGINS:
             del self._open[next(iter(self._open))]
         secret = new_secret()
-        session = Session(who, role, self.clock.now_ns())
+        session = LoggedIn(who, role, self.clock.now_ns())
         self._open[tablet_id(secret)] = _Login(session, tablet, self.pins.mark(who))
         return secret
 
@@ -209,7 +209,7 @@ class Logins:
             del self._open[key]
         return bool(found)
 
-    def session(self, tablet: str, secret: str) -> Session | None:
+    def session(self, tablet: str, secret: str) -> LoggedIn | None:
         """Return the login that a tablet has by this secret."""
         key = tablet_id(secret)
         login = self._open.get(key)
@@ -220,6 +220,6 @@ class Logins:
             return None
         return login.session
 
-    def is_fresh(self, session: Session) -> bool:
+    def is_fresh(self, session: LoggedIn) -> bool:
         """Return whether its PIN is young enough to move and write."""
         return self.clock.now_ns() - session.pin_at_ns <= PIN_S * NS_PER_S

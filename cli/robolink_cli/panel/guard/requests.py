@@ -24,7 +24,7 @@ _USUAL_PORTS: Final = {"http": 80, "https": 443}
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class Denial:
     """Why something is refused.
 
     Attributes:
@@ -40,7 +40,7 @@ class Refusal:
     wait_s: float = 0.0
 
 
-class Request:
+class PageRequest:
     """The head of a request or of a WebSocket's handshake.
 
     Args:
@@ -77,7 +77,7 @@ class Request:
         pairs = (pair.partition("=") for text in self.all(b"cookie") for pair in text.split(";"))
         return [value.strip() for key, _, value in pairs if key.strip() == name]
 
-    def misdirected(self, hosts: Collection[str], port: int) -> Refusal | None:
+    def misdirected(self, hosts: Collection[str], port: int) -> Denial | None:
         """Refuse a request by a name that is not this panel's, or past a proxy.
 
         Args:
@@ -87,17 +87,17 @@ class Request:
         host = self.one(b"host")
         if host is None or not is_host(host, hosts, port, self.scheme):
             why = tr("This panel is not called that. Open it by the address that it showed.")
-            return Refusal(421, why, "host")
+            return Denial(421, why, "host")
         if any(self.all(name) for name in _FORWARDED):
             why = tr("This panel answers no proxy. Open it by the address that it showed.")
-            return Refusal(403, why, "proxy")
+            return Denial(403, why, "proxy")
         if len(self.path) + len(self.scope["query_string"]) > _MOST_TARGET:
-            return Refusal(414, tr("The address is too long."), "path")
+            return Denial(414, tr("The address is too long."), "path")
         if _ODD_PATH.search(self.path):
-            return Refusal(404, tr("There is no such page."), "path")
+            return Denial(404, tr("There is no such page."), "path")
         return None
 
-    def foreign(self, *, strict: bool) -> Refusal | None:
+    def foreign(self, *, strict: bool) -> Denial | None:
         """Refuse what another page asks, or nobody's page.
 
         Args:
@@ -108,10 +108,10 @@ class Request:
         said = self.all(b"sec-fetch-site")
         ours = self.one(b"origin") == f"{self.scheme}://{self.one(b'host')}"
         if not ours or (said and site != "same-origin") or (strict and not said):
-            return Refusal(403, tr("Only a page of this panel may do that."), "origin")
+            return Denial(403, tr("Only a page of this panel may do that."), "origin")
         return None
 
-    def foreign_look(self) -> Refusal | None:
+    def foreign_look(self) -> Denial | None:
         """Refuse to be a part of another site's page; a link on one may lead here."""
         site = self.all(b"sec-fetch-site")
         if not site or site[0] in ("same-origin", "none"):
@@ -119,7 +119,7 @@ class Request:
         kind = self.one(b"sec-fetch-mode"), self.one(b"sec-fetch-dest")
         if kind == ("navigate", "document"):
             return None
-        return Refusal(403, tr("Only a page of this panel may do that."), "origin")
+        return Denial(403, tr("Only a page of this panel may do that."), "origin")
 
     @property
     def keeps_cookies(self) -> bool:

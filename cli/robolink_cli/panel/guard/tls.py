@@ -105,7 +105,7 @@ def load(path: Path, key: Path) -> Certificate:
     """
     if os.name == "posix" and key.exists() and stat.S_IMODE(key.stat().st_mode) & 0o077:
         raise ConfigError(
-            tr("Other users may read the key {path}.", path=key),
+            tr("Others than its owner can read {path}.", path=key),
             remedy=tr("Run: chmod 600 {path}", path=key),
         )
     try:
@@ -114,7 +114,7 @@ def load(path: Path, key: Path) -> Certificate:
     except (OSError, ValueError) as error:
         cause = (error.strerror or error) if isinstance(error, OSError) else tr("it is no PEM")
         raise ConfigError(
-            tr("The certificate {path} cannot be used: {cause}.", path=path, cause=cause),
+            tr("{path} and its key make no TLS: {cause}.", path=path, cause=cause),
             remedy=tr("Give a certificate and its own key as PEM, or run: robolink panel cert"),
         ) from error
     if not found.not_valid_before_utc <= wall_time() <= found.not_valid_after_utc:

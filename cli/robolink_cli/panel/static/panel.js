@@ -56,7 +56,7 @@ function hear(frame) {
     put(frame);
     fresh = true;
   } else if (frame.t === "beat") {
-    atMs = typeof frame.at_ms === "number" ? frame.at_ms - now() : null;
+    atMs = typeof frame.at_ms === "number" ? {server: frame.at_ms, now: now(), date: Date.now()} : null;
     readAt = typeof frame.age_ms === "number" ? now() - frame.age_ms : null;
     if (document.visibilityState === "visible") send({t: "pong"});
   } else if (frame.t === "stopped") stopAnswered(frame);
@@ -243,7 +243,7 @@ async function post({what, form}) {
   if (!answer.ok) {
     note(said.why, answer.status === 403 && !form);
     if (form) for (const input of form.querySelectorAll("[type=password]")) input.value = "";
-  } else if (form && form.dataset.onward) location.assign(form.dataset.onward);
+  } else if (form && form.dataset.onward) location.replace(form.dataset.onward);
   else if (what.then === "reload") location.reload();
 }
 
@@ -282,7 +282,10 @@ function release() {
 let latest = null;
 function stop() {
   const one = {press: identity(), begun: now(), done: false};
-  const at = atMs === null ? {} : {at_ms: Math.round(atMs + one.begun)}; // the press, by the clock of the server
+  // The press, by the clock of the server. In a tablet that slept one clock stood still, and one may be set anew:
+  // the longer time counts, so that no press of now is taken for an old one.
+  const since = atMs === null ? 0 : Math.max(one.begun - atMs.now, Date.now() - atMs.date);
+  const at = atMs === null ? {} : {at_ms: Math.round(atMs.server + since)};
   latest = one;
   place("stopped").hidden = true;
   place("stop").classList.add("down");

@@ -46,7 +46,7 @@ class WireLink:
         self._presses: deque[Pressed] = deque()
         self._lease = JogLease()
         self._alive_s = time.monotonic()
-        self._left = False
+        self._left = self._broken = False
         self.came = threading.Event()
         """Set when something came; whoever looks clears it."""
         threading.Thread(target=self._read, name="wire", daemon=True).start()
@@ -96,24 +96,28 @@ class WireLink:
     def _send(self, data: bytes) -> bool:
         rest = memoryview(data)
         end_s = time.monotonic() + _PATIENCE_S
-        while rest and not self._left:
+        while rest and not self._broken:
             try:
                 sent = self._wire.send(rest)
             except BlockingIOError:
                 left_s = end_s - time.monotonic()
                 if left_s <= 0 or not select.select([], [self._wire], [], left_s)[1]:
-                    self._leave()
+                    self._break()
             except (OSError, ValueError):
-                self._leave()
+                self._break()
             else:
                 rest = rest[sent:]
         return not rest
 
     def close(self) -> None:
         """Close the wire."""
-        self._leave()
+        self._break()
         with self._sending:
             self._wire.close()
+
+    def _break(self) -> None:
+        self._broken = True
+        self._leave()
 
     def _leave(self) -> None:
         self._left = True

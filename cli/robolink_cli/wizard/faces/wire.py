@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from robolink.errors import RobolinkError
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import tr
-from robolink_cli.wizard.ending import ended_of
+from robolink_cli.wizard.ending import ended_of, headed_of, is_blocked, stopped_lines
 from robolink_cli.wizard.faces.lines import carry_out, leaves
 from robolink_cli.wizard.faces.link import WireLink
 from robolink_cli.wizard.flow import advance
@@ -47,14 +47,15 @@ class WireFace:
     def __init__(self, link: WireLink) -> None:
         self._link = link
         self._sent: View | None = None
-        self._sent_s = 0.0
+        self._sent_s = self._looked_s = 0.0
+        self._changed = True
         self._left = False
         self._stepped: int | None = None
 
     def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
         """Show it until the work has ended and a person has left the last screen."""
         self._desk, self._state, self._work = desk, state, work
-        self._left = False
+        self._left, self._changed = False, True
         desk.silent_s = self._link.silent_s
         while True:
             ended = work.ended  # before what happened is asked for, so that nothing is missed
@@ -81,6 +82,7 @@ class WireFace:
     def _happens(self, happening: Happening) -> None:
         if isinstance(happening, WasTold):
             self._link.send({"t": "told", "text": happening.text[:_LONGEST_TOLD]})
+        self._changed = True
         self._state, effects = advance(self._state, happening)
         carry_out(self._desk, effects)
         self._left |= leaves(effects)
@@ -115,6 +117,9 @@ class WireFace:
         since_s = now_s - self._sent_s
         if self._sent is not None and since_s < _AT_LEAST_S:
             return
+        if not self._changed and now_s - self._looked_s < _AT_LEAST_S:
+            return
+        self._changed, self._looked_s = False, now_s
         view = view_of(self._state, now_s)
         if self._sent is not None and _ageless(view) == _ageless(self._sent):
             ages = view.status is not None and since_s >= _AGE_S
@@ -163,10 +168,11 @@ def last_screen(state: WizardState, error: BaseException | None, at_s: float) ->
     if ended is not None:
         return ended
     if error is None:
-        return LastScreen(True, state.remarks, (), at_s, tr("DONE"))
-    said = [str(error)]
+        return LastScreen(True, state.fresh or state.remarks, (), at_s, tr("DONE"))
     if isinstance(error, RobolinkError):
-        said = [one for one in (error.what, error.remedy) if one]
-    elif isinstance(error, KeyboardInterrupt):
-        said = [tr("You ended it.")]
-    return LastScreen(False, tuple(said), (), at_s, tr("STOPPED"), again=False)
+        said = [one for one in stopped_lines(state, error) if one]
+        blocked = is_blocked(error)
+        headed = headed_of(state, error)
+        return LastScreen(False, tuple(said), (), at_s, headed, again=not blocked, blocked=blocked)
+    why = tr("You ended it.") if isinstance(error, KeyboardInterrupt) else str(error)
+    return LastScreen(False, (why,), (), at_s, tr("STOPPED"), again=False)

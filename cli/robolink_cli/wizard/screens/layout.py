@@ -58,7 +58,7 @@ class Screen:
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
+class TerminalDraft:
     """What stands on a terminal alone: its marked row, what is typed there, the part that is shown.
 
     Attributes:

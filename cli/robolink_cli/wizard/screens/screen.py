@@ -8,8 +8,8 @@ from robolink_cli.wizard.screens.end import end_screen
 from robolink_cli.wizard.screens.fit import fit_screen
 from robolink_cli.wizard.screens.layout import (
     BODY,
-    Draft,
     Screen,
+    TerminalDraft,
     broken,
     keys_of,
     status_row,
@@ -41,10 +41,12 @@ def screen_of(state: WizardState, now_s: float) -> Screen:
         state: The state.
         now_s: The time, by the clock of its readings.
     """
-    return drawn(view_of(state, now_s), Draft(state.marked, state.typed, state.typing, state.page))
+    return drawn(
+        view_of(state, now_s), TerminalDraft(state.marked, state.typed, state.typing, state.page)
+    )
 
 
-def drawn(view: View, draft: Draft) -> Screen:
+def drawn(view: View, draft: TerminalDraft) -> Screen:
     """Return the drawing of a view.
 
     Args:
@@ -84,7 +86,7 @@ def _with_heard(view: View, screen: Screen) -> Screen:
     return replace(screen, lines=(*screen.lines, "", *rows[-room:]))
 
 
-def _question_screen(view: View, body: QuestionView, draft: Draft) -> Screen:
+def _question_screen(view: View, body: QuestionView, draft: TerminalDraft) -> Screen:
     """Return the screen of a question that has none of its own."""
     asked = ["", *broken(body.question), ""]
     keys: tuple[tuple[str, str], ...]

@@ -3,8 +3,8 @@
 from robolink.messages import tr
 from robolink_cli.console.tables import padded
 from robolink_cli.wizard.screens.layout import (
-    Draft,
     Screen,
+    TerminalDraft,
     keys_of,
     row_of,
     status_row,
@@ -19,7 +19,7 @@ _MOST_ANGLES = 4
 """Most angles of the turn test above the keys. More would leave no room for a message."""
 
 
-def touch_screen(view: View, body: TouchView, draft: Draft) -> Screen:
+def touch_screen(view: View, body: TouchView, draft: TerminalDraft) -> Screen:
     """Return the screen on which a person jogs the tip to a place."""
     lines = [
         *body.instruction,
@@ -102,7 +102,7 @@ def _keypad(pad: JogPad) -> list[str]:
     ]
 
 
-def _typing(view: View, body: TouchView, draft: Draft) -> list[str]:
+def _typing(view: View, body: TouchView, draft: TerminalDraft) -> list[str]:
     """Return the field of a typed pose, if one can be typed."""
     if draft.typing:
         return [

@@ -6,8 +6,8 @@ from robolink.messages import tr
 from robolink_cli.console.tables import padded
 from robolink_cli.wizard.screens.layout import (
     BODY,
-    Draft,
     Screen,
+    TerminalDraft,
     broken,
     row_of,
     title_row,
@@ -23,7 +23,7 @@ _NARROW = 10
 _ROOM = BODY - 2
 
 
-def values_screen(view: View, body: ValuesView, draft: Draft) -> Screen:
+def values_screen(view: View, body: ValuesView, draft: TerminalDraft) -> Screen:
     """Return the screen of a proposal; several tools in a short form."""
     typed = tr(
         "To write, type the tool number, then [*] or Space.   Tool: {typed}_", typed=draft.typed

@@ -9,8 +9,8 @@ from robolink_cli.wizard.views.records import (
     Action,
     CheckRow,
     CheckView,
-    ChoiceRow,
     ChoiceView,
+    ListRow,
     QuestionView,
     Weight,
 )
@@ -24,7 +24,7 @@ def choice_part(state: WizardState, subject: ChoiceSubject) -> Part:
     assert state.question is not None  # noqa: S101 - checked by the caller
     details = subject.details or ((),) * len(subject.options)
     rows = tuple(
-        ChoiceRow(option, str(number), tuple(told))
+        ListRow(option, str(number), tuple(told))
         for number, (option, told) in enumerate(zip(subject.options, details, strict=True), 1)
     )
     does = subject.does or tr("Next")

@@ -87,7 +87,7 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
-class ChoiceRow:
+class ListRow:
     """A row of a list.
 
     Attributes:
@@ -116,7 +116,7 @@ class ChoiceView:
 
     above: tuple[str, ...]
     question: str
-    rows: tuple[ChoiceRow, ...]
+    rows: tuple[ListRow, ...]
     marked: int | None
     does: str
     other_language: str = ""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
 
+from robolink_simulators.cell.frames import Z_AXIS, Frame, about
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -24,6 +25,8 @@ from tests.contract._sensor_cell import sensor_cell
 
 EXAMPLES: Final = Path(__file__).parents[2] / "examples" / "recipes"
 BEAMS_MM: Final = (175.0, 488.0, -106.0)
+START_MM_OF_THE_NEEDLE: Final = (158.6, 495.4, -80.0)
+"""Where the flange of the EPSON's needle is before its change."""
 PIN_MM_OF_THE_NEEDLE: Final = 0.35
 """By how much the needle of the one-touch recipe is longer than the one before."""
 
@@ -139,6 +142,32 @@ def _on_a_plc(name: str, kinematics: str, seed: int, touches: str = "") -> Itera
         yield ShippedCell(simulator, url, EXAMPLES / name, person)
 
 
+@contextmanager
+def _needle_on_a_plc(rounds: int = 1, seed: int = 3) -> Iterator[ShippedCell]:
+    """Set up the beams of the needle around a PLC's arm of the same lengths, at the same place.
+
+    Args:
+        rounds: How often it goes around the beams. The recipe says once; on a PLC that is too
+            little for some needles (docs/reference/sensors.md 3).
+        seed: Of the cell.
+    """
+    arms = {"dArmLength1": 325.0, "dArmLength2": 275.0}
+    simulator = SoftMotionSimulator(seed=seed, parameters=arms)
+    group = simulator.plc.group
+    start = Frame(START_MM_OF_THE_NEEDLE, about(Z_AXIS, 0.0))
+    configuration = group.kinematics.configuration(group.values)
+    group.place(group.kinematics.axes_for(start, configuration, group.values))
+    for number, heading_deg in ((3, 2.0), (4, 91.0)):
+        beam = LightBeam(BEAMS_MM, heading_deg, radius_mm=0.1)
+        simulator.world.connect(number, beam, noise_mm=0.003)
+    text = (EXAMPLES / "needle-beams.toml").read_text()
+    assert "repeats = 1 " in text
+    with served(simulator) as url, tempfile.TemporaryDirectory() as folder:
+        recipe = Path(folder) / "needle-beams.toml"
+        recipe.write_text(text.replace("repeats = 1 ", f"repeats = {rounds} "))
+        yield ShippedCell(simulator, url, recipe, ())
+
+
 CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
     "scara-pin": lambda: touched("scara-pin.toml"),
     "two-nozzles": lambda: touched("two-nozzles.toml"),
@@ -153,6 +182,12 @@ CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
     "sphere": lambda: _on_a_plc("sphere.toml", "Kin_5Axes", 4, "sphere"),
 }
 """The cell of each shipped recipe that moves a robot; by ``pendant-points`` nothing moves."""
+
+PLC_CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
+    "needle-beams on a PLC": _needle_on_a_plc,
+    "needle-beams on a PLC, two rounds": lambda: _needle_on_a_plc(rounds=2),
+}
+"""The cell of a PLC for a recipe that is made for an EPSON."""
 
 
 @contextmanager
@@ -184,7 +219,7 @@ def shipped_cell(name: str, answer_ms: float = 0.0) -> Iterator[ShippedCell]:
     folder = tempfile.mkdtemp(prefix="robolink-shipped-")
     os.environ["ROBOLINK_STATE_DIR"] = folder
     try:
-        with CELLS[name]() as cell:
+        with (CELLS | PLC_CELLS)[name]() as cell:
             cell.simulator.answer_s = answer_ms / 1000
             yield cell
     finally:

@@ -88,3 +88,14 @@ def test_it_is_said_of_every_shipped_recipe_from_its_second_run_on(name, answers
         for answer_ms in answers_ms:
             last = carried_out(answering(cell, answer_ms))
         told(last)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("answers_ms", [(0, 20), (20, 0), (5, 50), (0, 50)])
+@pytest.mark.parametrize("name", ["needle-beams on a PLC, two rounds", "gantry-touch-probe"])
+def test_a_plc_that_answers_later_than_before_is_foreseen_too(name, answers_ms):
+    """Where answers are late, the driver reads other blocks than where they come at once."""
+    before_ms, now_ms = answers_ms
+    with shipped_cell(name) as cell:
+        carried_out(answering(cell, before_ms))
+        told(carried_out(answering(cell, now_ms)))

@@ -11,6 +11,7 @@ from robolink.controllers.movement_time import AnswerCounts, JointRates, Way, ra
 from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.commands import Require
 from robolink.controllers.softmotion.condition import (
+    is_moving,
     require_beats,
     require_enabled,
     require_permit,
@@ -83,7 +84,7 @@ class SoftMotionGroup(MotionGroupCore):
 
     def pose(self) -> Pose:
         """Read where the tip of the selected tool is now."""
-        now = self._mailbox.snapshots.take()
+        now = self._just_at_rest or self._mailbox.snapshots.take()
         return self._mailbox.pose(now.tcp, tool=now.tool_slot)
 
     def axes(self) -> dict[str, tuple[float, ...]]:
@@ -227,6 +228,13 @@ class SoftMotionGroup(MotionGroupCore):
         for motion in self._current:
             if not motion.settled:
                 motion.abort()
+
+    @property
+    def _just_at_rest(self) -> Response | None:
+        """The snapshot that showed the rest after our last movement, if it is the last of all."""
+        rest = self._current[-1].rest if self._current else None
+        known = self._mailbox.snapshots.of_this_step()
+        return rest if rest is known and known is not None and not is_moving(known) else None
 
     def _start(self, target: Pose, draft: Command) -> SoftMotionMotion:
         """Start a movement inside the limits; see the model."""

@@ -9,6 +9,7 @@ If the program is killed nothing of it goes on, not even to clean up: its connec
 process has ended as far as the system shows, and the controller carries out what it has received.
 """
 
+import gc
 import os
 import traceback
 from collections import Counter
@@ -153,6 +154,7 @@ class Worlds(Instants):
                 self.told.append(f"at {at.kind} {nth} of {at.what}: {said or status}")
             return False
         os.close(reading)
+        gc.disable()  # it would look at, and so copy, all that this short world shares
         self._tells_to = writing
         return True
 

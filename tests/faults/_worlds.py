@@ -47,12 +47,12 @@ class Worlds(Instants):
         told: The faults found in those worlds, with their instants.
 
     Args:
-        comes: Whether to disturb an instant.
+        comes: How many worlds to disturb at an instant.
         happens: The disturbance; without it the program is killed, at an exchange or at a commit.
     """
 
     def __init__(
-        self, comes: Callable[[Instant], bool], happens: Callable[[Instant], None] | None = None
+        self, comes: Callable[[Instant], int], happens: Callable[[Instant], None] | None = None
     ) -> None:
         super().__init__()
         self.came_at: list[Instant] = []
@@ -76,7 +76,7 @@ class Worlds(Instants):
             super().pass_by(kind, what)
             at = self.passed[-1]
             self._asked[f"{kind} {what}"] += 1
-            if self._comes(at) and self._fork():
+            if any(self._fork() for _ in range(self._comes(at))):
                 self._dead = self._happens is None
                 if self._happens is not None:
                     self._happens(at)

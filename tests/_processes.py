@@ -46,6 +46,8 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     if not hasattr(os, "fork"):
         raise pytest.UsageError("--processes needs a system that can fork; leave it out")
     modules = [list(tests) for _, tests in groupby(session.items, lambda test: test.path)]
+    # Tests of faults fork, which costs less while little was run: it copies tables of all memory.
+    modules.sort(key=lambda tests: "faults" not in tests[0].path.parts)
     queue = _numbers(len(modules))
     session.config.get_terminal_writer().flush()
     session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]

@@ -274,7 +274,7 @@ CALIBRATION_SHARES: Final = 4 if EVERYTHING else 1
 @pytest.mark.fault("F60")
 def test_f60_a_calibration_killed_anywhere_leaves_the_old_or_the_new_value(share):
     cell = EpsonRecipeCell((1,))
-    worlds = Worlds(calibrations.Dealt(share, CALIBRATION_SHARES))
+    worlds = Worlds(calibrations.Dealt(share, shares=CALIBRATION_SHARES))
     calibrations.meet(cell)
     ended = worlds.explore(
         lambda: cell.run(*calibrations.words(cell), instants=worlds),

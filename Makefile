@@ -84,6 +84,11 @@ $(TYPE_JUDGE): $(VENV)/.installed-dev
 	mkdir -p $@
 	npm install --silent --no-fund --no-audit --prefix $@ pyright@1.1.414 || true
 
+# Debian's chromium, or what `chromium` on PATH is. With NEED_CHROMIUM=1 a test that cannot run fails.
+.PHONY: panel
+panel: $(VENV)/.installed-browser ## Press the pages of the panel in a real browser; needs chromium and fonts-noto-cjk.
+	$(BIN)/python -m pytest -n 0 tests/panel/browser
+
 # NIGHT= hours; PARTS="docs peers" runs some. The parts and their shares: tools/nightly.py.
 NIGHT ?= 8
 PARTS :=
@@ -179,6 +184,10 @@ $(VENV)/.installed-dev: pyproject.toml $(VENV)/.created
 
 $(VENV)/.installed-docs: $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --no-compile --editable '.[docs]'
+	touch $@
+
+$(VENV)/.installed-browser: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[browser]'
 	touch $@
 
 $(VENV)/.installed: pyproject.toml $(VENV)/.created

@@ -15,6 +15,7 @@ CASES: Final = {
     "fleet": "links.fleet",
     "start-up": "links.start_up",
     "stopping": "links.stopping",
+    "panel": "links.panel",
     "journal": "work.journal",
     "nozzle-change": "work.nozzle_change",
     "virtual-time": "work.virtual_time",

@@ -19,6 +19,7 @@ TITLES: Final = {
     "fleet": "Thousands of simulated controllers",
     "start-up": "Start of the command line",
     "stopping": "A stop, and a look",
+    "panel": "The panel",
     "journal": "A large journal",
     "nozzle-change": "A nozzle change in process",
     "virtual-time": "Cells in virtual time",
@@ -49,6 +50,9 @@ NOTES: Final = {
     "\nreal driver (a tool a minute is compared, written, read back and recorded), in"
     "\none process and divided among as many as there are CPUs: cells know nothing of"
     "\neach other.",
+    "panel": "Robot, panel and job are processes of their own. The parts of a page are drawn"
+    "\nonce for all tablets that see the same, here twice: for the one that has the seat,"
+    "\nand for those that watch.",
     "solvers": "Where lstsq with covariance is the floor, it starts from arrays. A calibration"
     "\ngets poses, each with a hand, a tool and a local: to read and compare these"
     "\ntakes 115 us for 1,000 poses on four axes, a quarter of the whole. Each side"

@@ -359,6 +359,7 @@ class NotReadyReason(StrEnum):
     VIRTUAL_IO = "virtual_io"
     OTHER_ROBOT = "other_robot"
     OTHER_BASE = "other_base"
+    NOT_PERMITTED = "not_permitted"
 
 
 class NotReadyError(ControllerError):
@@ -378,8 +379,8 @@ class NotReadyError(ControllerError):
         controller: str = "",
         request: str = "",
     ) -> None:
-        super().__init__(what, code=code, remedy=remedy, controller=controller, request=request)
         self.reason = reason
+        super().__init__(what, code=code, remedy=remedy, controller=controller, request=request)
 
 
 class ControllerFaultError(ControllerError):
@@ -478,8 +479,7 @@ class VerifyError(RobolinkError):
     """The turn test did not confirm the tip; the old value was restored.
 
     Attributes:
-        code: The named reason: ``large_drift``, ``drift_undecided``, ``not_touched`` ..; empty
-            where there is none of its own.
+        code: The named reason, such as ``large_drift`` or ``not_touched``; empty for none.
         next_commands: What a person chose to do next, each after ``robolink`` and the name of the
             cell; empty for beginning the same again.
     """

@@ -55,10 +55,7 @@ _LOOK_BACK: Final = {
 _SET_UP: Final = {
     "cell": (f"{GROUPS}:cell", "list new show tools check doctor scan people station accuracy"),
     "sim": (f"{SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
-    "demo": (
-        f"{SIMULATE}.demo:demo",
-        declared("A whole needle change on a simulated robot; needs no machine"),
-    ),
+    "panel": (f"{COMPUTER}.panel:panel", declared("Pages for a tablet at the cell")),
 }
 
 SECTIONS: Final = {
@@ -75,12 +72,14 @@ SHORT_NAMES: Final = {
     "check": f"{COMPUTER}.cell_check:check",
     "check-contract": f"{CONTROLLER}.check_contract:check_contract",
     "config": f"{GROUPS}:config",
+    "demo": f"{SIMULATE}.demo:demo",
     "docs": f"{SHIPPED}.docs:docs",
     "expert": f"{GROUPS}:expert",
     "recipe": f"{SHIPPED}.recipe:recipe",
 }
-"""Names that work but are not listed. ``check``, ``check-contract``, ``docs`` and ``recipe`` are
-short for commands listed under ``cell`` and ``expert``. The former commands of ``config`` name
+"""Names that work but are not listed; the line below the list names ``demo``. ``check``,
+``check-contract``, ``demo``, ``docs`` and ``recipe`` are short for commands listed under ``cell``
+and ``expert``. The former commands of ``config`` name
 their replacements.
 """
 

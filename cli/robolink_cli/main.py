@@ -21,10 +21,10 @@ from robolink_cli.console.output import (
     colour_wanted,
     hand_over,
     help_width,
-    may_be_guided,
     tolerate_any_console,
     watched_output,
 )
+from robolink_cli.console.person import Person, may_be_guided, person_here
 from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
 from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.lazy_group import FrontPage
@@ -180,6 +180,15 @@ def _explained(error: BaseException) -> BaseException:
 def _invoke(arguments: Sequence[str]) -> int:
     if not arguments and may_be_guided():
         arguments = ["change"]  # without arguments, ask what to do
+    if person_here() is not Person.WIRE:
+        return _carried_out(arguments)
+    from robolink_cli.wizard.host import whole_command
+    from robolink_cli.wizard.state import Header
+
+    return whole_command(Header("", " ".join(arguments[:1])), lambda: _carried_out(arguments))
+
+
+def _carried_out(arguments: Sequence[str]) -> int:
     colour = colour_wanted()
     width = help_width()
     with _root().make_context(

@@ -228,6 +228,12 @@ class CellSettings(BaseModel):
             and largest single one, that is believed.
         interval_tolerance_mm: Largest distance from the truth within which a tip lies in 95 %.
         accuracy: What is stated of the rows of a budget for the whole cell.
+        watch_s: How often a panel looks at the cell while no job runs; a missing one is for only
+            when its page is opened.
+        enable_input: Number of the input, a key switch, that is on whenever the robot may move; it
+            is read before each movement.
+        stop_on_silence_s: How long a page that shows a job may be silent during a movement until
+            the robot is stopped; a missing one lets the movement end by itself.
         people: Who works at the cell: badge or name, and ``operator`` or ``engineer``.
         stations: Pins, beams, surfaces and cameras that stand there, by name.
         notes: For people.
@@ -256,6 +262,9 @@ class CellSettings(BaseModel):
     residual_tolerance_mm: Positive | None = None
     interval_tolerance_mm: Positive | None = None
     accuracy: AccuracySettings | None = None
+    watch_s: Annotated[float, Field(ge=5)] | None = None
+    enable_input: Annotated[int, Field(ge=0, le=9999)] | None = None
+    stop_on_silence_s: Annotated[float, Field(ge=1)] | None = None
     people: dict[Text, PersonRole] | None = None
     stations: dict[Text, StationSettings] | None = None
     notes: str | None = None

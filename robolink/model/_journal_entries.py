@@ -40,6 +40,7 @@ class EntryKind(StrEnum):
     ACCURACY = "accuracy"
     ORDER = "order"
     RUN = "run"
+    PANEL = "panel"
 
 
 PROOFS: Final = (
@@ -56,6 +57,7 @@ NO_HISTORY: Final = (
     EntryKind.LEASE,
     EntryKind.CHECK,
     EntryKind.RUN,
+    EntryKind.PANEL,
 )
 """Kinds of entries about a controller that do not record a change."""
 
@@ -74,7 +76,7 @@ class NewEntry:
         details: Plain JSON values.
     """
 
-    json_version: ClassVar[int] = 2
+    json_version: ClassVar[int] = 3
     kind: EntryKind
     change: str = ""
     operation: str = ""
@@ -133,7 +135,7 @@ class Recorded:
         hash: SHA-256 of all other fields.
     """
 
-    json_version: ClassVar[int] = 2
+    json_version: ClassVar[int] = 3
     number: int
     at: str
     controller: str

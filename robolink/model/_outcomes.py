@@ -243,7 +243,7 @@ class Finding:
         entries: What recovering it records.
     """
 
-    json_version: ClassVar[int] = 2
+    json_version: ClassVar[int] = 3
     marker: Marker
     verdict: Verdict
     sentence: str

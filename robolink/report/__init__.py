@@ -1,6 +1,6 @@
 """The report of a tool change: one self-contained HTML page."""
 
-from robolink.report._page import render, render_drift, save, save_drift
+from robolink.report._page import Picture, chart_picture, render, render_drift, save, save_drift
 from robolink.report._recorded import recorded_fit, reports_of
 from robolink.report._values import (
     Attempt,
@@ -12,16 +12,21 @@ from robolink.report._values import (
     TouchOnRecord,
 )
 from robolink.report.pictures.control_chart import chart_title
+from robolink.report.sections.summary import Heading, heading
 
 __all__ = [
     "Attempt",
     "GaugeOnRecord",
+    "Heading",
     "Judgement",
     "Outcome",
+    "Picture",
     "Record",
     "Report",
     "TouchOnRecord",
+    "chart_picture",
     "chart_title",
+    "heading",
     "recorded_fit",
     "render",
     "render_drift",

@@ -49,6 +49,8 @@ def plain(text: str) -> str:
     has; here is the one place at which that becomes a sign.
     """
     text = _PLUS_MINUS.sub("\u00b1 ", text)
+    if text.isprintable():  # nothing invisible is
+        return text
     return "".join("\ufffd" if unicodedata.category(c) in _INVISIBLE else c for c in text)
 
 

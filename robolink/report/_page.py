@@ -4,13 +4,13 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from robolink.calibration import rows_in_words, stated_mm
-from robolink.drift import CellDrift, last_statements
+from robolink.drift import CellDrift, Chart, last_statements
 from robolink.files.named import save_named
 from robolink.messages import tr
 from robolink.report._markup import drawing, plain, rounded
@@ -102,6 +102,28 @@ def plus_minus(half95: float) -> Markup:
 def drawn(one: Drawing) -> Markup:
     """Return a drawing as it stands in the page."""
     return Markup(drawing(one.svg))
+
+
+class Picture(NamedTuple):
+    """A drawing for a page, and what is to be read of it.
+
+    Attributes:
+        svg: The drawing; all text in it is escaped.
+        caption: Sentences.
+    """
+
+    svg: Markup
+    caption: str
+
+
+def chart_picture(chart: Chart) -> Picture:
+    """Return the control chart of one coordinate, as the page of a drift shows it.
+
+    Args:
+        chart: The chart.
+    """
+    found = chart_drawing(chart)
+    return Picture(drawn(found), found.caption)
 
 
 def drawings(report: Report) -> list[Drawing]:

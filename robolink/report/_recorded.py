@@ -265,6 +265,7 @@ _NOT_ABOUT_A_CHANGE = (
     EntryKind.RECONNECT,
     EntryKind.RAW,
     EntryKind.RUN,
+    EntryKind.PANEL,
     EntryKind.DECISION,
 )
 """Kinds of entries whose tool, if any, was not changed."""

@@ -23,6 +23,7 @@ from robolink.runner._jog_steps import (
     refuse_decimal_comma,
     way_in_words,
 )
+from robolink.runner._movement_permit import MovementPermit, permitted_by
 from robolink.runner._place_question import AGAIN, MOST_REFUSED, TakenAgainError, inputs_of
 from robolink.runner._prompt_context import (
     POLL_S,
@@ -86,6 +87,7 @@ __all__ = [
     "MOST_REFUSED",
     "Move",
     "MoveSubject",
+    "MovementPermit",
     "NotYet",
     "Notify",
     "OfferedChoice",
@@ -120,6 +122,7 @@ __all__ = [
     "nothing_in_the_way",
     "parse_decimal",
     "parse_steps",
+    "permitted_by",
     "refuse_decimal_comma",
     "regard",
     "way_between",

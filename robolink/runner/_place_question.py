@@ -8,7 +8,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from robolink.errors import CalibrationError, ConfigError, DeclinedError, JournalError
+from robolink.errors import (
+    CalibrationError,
+    ConfigError,
+    DeclinedError,
+    JournalError,
+    NotReadyError,
+    NotReadyReason,
+)
 from robolink.messages import listed, tr
 from robolink.model import Controller, DigitalIo, InputEdge, MotionGroup, Pose
 from robolink.runner._jog_steps import parse_steps
@@ -244,6 +251,10 @@ class PlaceQuestion:
                 self._ask()
         except ConfigError as error:
             return self._refuse(error, refused)
+        except NotReadyError as error:
+            if error.reason is not NotReadyReason.NOT_PERMITTED:
+                raise
+            self._operator.tell(str(error))  # nothing was sent, and nothing is wrong with the step
         return 0
 
     def _refuse(self, error: ConfigError, refused: int) -> int:

@@ -38,6 +38,7 @@ from robolink.runner._jog_steps import (
     typed_pose,
     way_in_words,
 )
+from robolink.runner._movement_permit import movement_permit
 from robolink.runner._place_question import PlaceQuestion
 from robolink.runner._prompt_context import (
     POLL_S,
@@ -231,6 +232,9 @@ class Runner:
         Raises:
             StoppedError: It was stopped before it arrived.
         """
+        return self._move(target, path, by_hand=False)
+
+    def _move(self, target: Pose, path: Path, *, by_hand: bool) -> Pose:
         profile = MotionProfile(path, self._settings.speed_percent, self._settings.speed_mm_s)
 
         def go() -> MotionOutcome:
@@ -238,7 +242,7 @@ class Runner:
             with self.robot_time.awaiting(target, path):
                 return motion.wait(timeout_s=self._settings.motion_timeout_s)
 
-        outcome = self._seen_through(go, target)
+        outcome = self._seen_through(go, target, by_hand=by_hand)
         if outcome is not MotionOutcome.ARRIVED:
             raise StoppedError(
                 tr("The robot was stopped on its way."),
@@ -258,7 +262,7 @@ class Runner:
         """
         before = self._group.pose()
         target, path = jog_target(before, steps, self._settings)
-        after = self.move(target, path)
+        after = self._move(target, path, by_hand=True)
         if self._guided is not None:
             longest = max(map(abs, parse_steps(steps).values()))
             self._guided.regard(JogSubject(before, after, longest))
@@ -369,15 +373,15 @@ class Runner:
     def _typed_pose(self, text: str, here: Pose) -> Pose:
         return typed_pose(text, here, self._settings)
 
-    def _seen_through(self, go: Callable[[], T], target: Pose) -> T:
-        """Move, and again from where the robot is if this computer was too busy to.
+    def _seen_through(self, go: Callable[[], T], target: Pose, *, by_hand: bool = False) -> T:
+        """Move when all permits are given; again from here if this computer was too busy to.
 
-        The controller has ended the movement, so that what follows is another one, to the same
-        place; a person decides on it, a bounded number of times.
+        The controller has ended the movement: a person decides on another, a few times at most.
         """
         while True:
             try:
-                return go()
+                with movement_permit(self._controller, by_hand=by_hand):
+                    return go()
             except HeartbeatLostError:
                 if not self._repeats_left or not self._stands(target) or not self._again():
                     raise

@@ -222,7 +222,9 @@ def test_a_person_who_says_no_leaves_everything_as_it_was(run, simulator, golden
     def say_no(question):
         raise DeclinedError(question)
 
-    monkeypatch.setattr(questions, "on_terminal", lambda: True)
+    monkeypatch.setattr(questions, "person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.stopping.notes.person_here", lambda: True)
     monkeypatch.setattr(questions, "require_yes", say_no)
     simulator.machine.tools.set(1, ToolOffset(99))
     code, out, err = run("restore", golden)
@@ -318,8 +320,10 @@ def test_off_a_terminal_it_takes_yes(run, simulator, changed, more):
 @pytest.mark.parametrize(("answer", "expected"), [(True, (0, OLD)), (False, (9, NEW))])
 def test_on_a_terminal_it_asks(run, simulator, changed, monkeypatch, answer, expected):
     questions = []
-    monkeypatch.setattr("robolink_cli.commands.record.undo.on_terminal", lambda: True)
-    monkeypatch.setattr(consent, "on_terminal", lambda: True)
+    monkeypatch.setattr("robolink_cli.commands.record.undo.person_here", lambda: True)
+    monkeypatch.setattr(consent, "person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.stopping.notes.person_here", lambda: True)
 
     def asked(question):
         questions.append(question)

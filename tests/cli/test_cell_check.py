@@ -179,8 +179,9 @@ def watched(simulator, monkeypatch, tmp_path):
             if not yes:
                 raise DeclinedError("You said no.")
 
-        monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
-        monkeypatch.setattr("robolink_cli.commands.computer.cell_check.on_terminal", lambda: True)
+        monkeypatch.setattr("robolink_cli.prompts.questions.person_here", lambda: True)
+        monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
+        monkeypatch.setattr("robolink_cli.commands.computer.cell_check.person_here", lambda: True)
         monkeypatch.setattr("robolink_cli.prompts.questions.require_yes", require_yes)
         return asked
 

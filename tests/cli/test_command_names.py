@@ -13,7 +13,7 @@ import click
 import pytest
 from click.shell_completion import BashComplete
 from robolink_cli import main
-from robolink_cli.command_map import RENAMED, SECTIONS
+from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
 from robolink_cli.commands.groups import config
 
 from robolink.journal import open_log
@@ -289,7 +289,7 @@ def test_each_name_of_before_takes_what_it_took(name):
 def test_no_name_of_before_is_forgotten():
     heads = {name.split()[0] for name in BEFORE["commands"]}
     listed = {name for part in SECTIONS.values() for name in part}
-    assert heads <= listed | set(RENAMED) | {"config"}
+    assert heads <= listed | set(RENAMED) | set(SHORT_NAMES)
     assert {f"config {name}" for name in config.renamed} <= set(BEFORE["commands"])
 
 

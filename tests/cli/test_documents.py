@@ -20,10 +20,10 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "json.md"
 SHOWN = {key: described for key, described in PUBLISHED.items() if "x-commands" in described}
 PRINTS_NO_DOCUMENT = {"expert completion"}
-GROUPS_THAT_SHOW = {"cell accuracy"}
+GROUPS_THAT_SHOW = {"cell accuracy", "panel"}
 BEHIND_AN_EMIT = re.compile(r'(?<!events\.)(?<!self\.)\bemit\(\s*"([a-z-]+)"')
 WHOLE = re.compile(r'"robolink/([a-z-]+)/(\d+)')
-READ_NOT_PRINTED = {"sim-cells-1"}
+READ_NOT_PRINTED = {"panel-tablet-1", "sim-cells-1"}
 
 
 def commands():

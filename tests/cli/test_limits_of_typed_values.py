@@ -71,7 +71,8 @@ class Person:
 def person(monkeypatch, request):
     person = Person(request.param)
     for module in (consent, jumps):
-        monkeypatch.setattr(module, "on_terminal", lambda: True)
+        monkeypatch.setattr(module, "person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
     monkeypatch.setattr(_operator, "terminal", lambda: person)
     return person
 

@@ -25,7 +25,7 @@ def typing(monkeypatch):
             asked.append(question)
             return left.pop(0)
 
-        monkeypatch.setattr(config, "on_terminal", lambda: True)
+        monkeypatch.setattr(config, "person_here", lambda: True)
         monkeypatch.setattr(config, "asked_for_text", answer)
         return asked
 

@@ -13,7 +13,7 @@ from robolink_cli import main
 from robolink_cli.commands.record import recover as recover_command
 from robolink_cli.console.exit_codes import next_of
 from robolink_cli.console.language import speaking_for
-from robolink_cli.wizard.screens.end import stopped_lines
+from robolink_cli.wizard.ending import stopped_lines
 from robolink_cli.wizard.state import WizardState
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import epson, softmotion

@@ -49,8 +49,10 @@ def open_markers(url):
 @pytest.fixture
 def person(monkeypatch, request):
     person = Person(request.param)
-    monkeypatch.setattr(connection, "on_terminal", lambda: True)
-    monkeypatch.setattr(consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(connection, "person_here", lambda: True)
+    monkeypatch.setattr(consent, "person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.stopping.notes.person_here", lambda: True)
     monkeypatch.setattr(operator, "terminal", lambda: person)
     return person
 

@@ -186,8 +186,9 @@ def person(monkeypatch):
 
     def sits(plc, *answers):
         person = Person(plc, *answers)
-        monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
-        monkeypatch.setattr("robolink_cli.commands.companions.check_map.on_terminal", lambda: True)
+        monkeypatch.setattr("robolink_cli.prompts.questions.person_here", lambda: True)
+        monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
+        monkeypatch.setattr("robolink_cli.commands.companions.check_map.person_here", lambda: True)
         monkeypatch.setattr("robolink_cli.prompts.operator.terminal", lambda: person)
         return person
 

@@ -308,7 +308,9 @@ def test_a_person_is_shown_who_stopped_it_and_asked(
     assert stop("-c", moving.url, "--operator", "anna")[0] == 0
     assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
     started, person = moving.machine.arm.moves_started, Person(answer)
-    monkeypatch.setattr(consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(consent, "person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.stopping.notes.person_here", lambda: True)
     monkeypatch.setattr(_operator, "terminal", lambda: person)
     capsys.readouterr()
     assert main.run(["jog", "x+1", "-c", moving.url]) == code

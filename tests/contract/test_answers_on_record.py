@@ -85,11 +85,13 @@ def somebody_at(face, arm, monkeypatch):
         person: Any = Person.with_eyes(eyes, lambda _text: None, clock=arm.clock)
         monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
         for place in (
+            "stopping.notes",
             "prompts.questions",
+            "session.motion_consent",
             "commands.measure.recalibration",
             "commands.record.undo",
         ):
-            monkeypatch.setattr(f"robolink_cli.{place}.on_terminal", lambda: True)
+            monkeypatch.setattr(f"robolink_cli.{place}.person_here", lambda: True)
         with sitting_at(person) if face == "wizard" else nullcontext():
             yield
 
@@ -160,7 +162,9 @@ def test_what_yes_and_options_answer_is_on_record_as_that(arm, tmp_path):
 
 
 def test_a_stand_in_is_no_person(arm, tmp_path, monkeypatch):
-    monkeypatch.setattr(questions, "on_terminal", lambda: True)
+    monkeypatch.setattr(questions, "person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.stopping.notes.person_here", lambda: True)
     monkeypatch.setattr(questions, "asked", lambda _question: True)
     done = arm.run("recalibrate", recipe(tmp_path), "--assist", arm.cell.url, "--answer", "2=L-7")
     assert done.code == 0, done.err

@@ -180,7 +180,7 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
         asked.append(question)
         raise robolink.errors.DeclinedError("You said no.")
 
-    monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
+    monkeypatch.setattr(given_poses, "person_here", lambda: True)
     monkeypatch.setattr(given_poses, "agree", decline)
     assert command(*calibrate("--points", "901,902", "--axes-held"))[0] == 9
     (question,) = asked
@@ -213,8 +213,9 @@ class AtTerminal:
 def test_whether_axes_were_held_is_asked_once_and_on_record(command, simulator, monkeypatch, given):
     person = AtTerminal()
     monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
-    monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
-    monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
+    monkeypatch.setattr(given_poses, "person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.prompts.questions.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
     code, out, err = command(*calibrate(*given, "--json"))
     assert code == 0, err
     assert [one for one in person.asked if "SFREE" in one] == [
@@ -234,7 +235,7 @@ def decisions(command):
 def test_poses_taught_with_axes_let_go_are_refused(command, simulator, monkeypatch):
     person = AtTerminal(held="n")
     monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
-    monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
+    monkeypatch.setattr(given_poses, "person_here", lambda: True)
     code, out, _ = command(*calibrate("--points", "901,902", "--json"))
     assert code == 7
     assert json.loads(out)["error"]["code"] == "axes_free"

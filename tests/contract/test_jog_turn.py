@@ -137,7 +137,8 @@ def test_it_asks_before_it_moves_and_nobody_there_is_a_no(arm, monkeypatch, went
         asked.append(question)
         return False
 
-    monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
+    monkeypatch.setattr("robolink_cli.prompts.questions.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
     monkeypatch.setattr("robolink_cli.prompts.questions.asked", answered)
     assert arm.run("robot", "jog", "--turn", "-180").code == 9
     (question,) = asked

@@ -185,7 +185,8 @@ def test_a_recipe_offers_the_worst_pose_again_and_the_answer_is_on_record(
     source = 'kind = "n-angle"\ncount = 4\nretake = true\nuntil_mm = 1.0'
     text = AT_STATION.format(source=source, station="PIN-07", z="kept")
     path = written(tmp_path / "recipe.toml", text)
-    monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
+    monkeypatch.setattr("robolink_cli.prompts.questions.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.session.motion_consent.person_here", lambda: True)
     monkeypatch.setattr(
         "robolink_cli.commands.measure.recalibration.agree_to_motion", lambda *_, **__: None
     )

@@ -188,9 +188,13 @@ class Sits:
     def __init__(self, answer):
         self.answer, self.pages, self.asked = answer, [], []
         self.glance = lambda: None
+        self.silent_s = lambda: 0.0
 
     def tell(self, text):
         pass
+
+    def wait_while(self, why):
+        assert not why()
 
     def following(self, look):
         return nullcontext()

@@ -64,9 +64,13 @@ class Desk(_operator.AssistedOperator):
     asked: tuple[str, ...] = ()
 
     glance: Callable[[], Any] = staticmethod(lambda: None)
+    silent_s: Callable[[], float] = staticmethod(lambda: 0.0)
 
     def regard(self, subject):
         pass
+
+    def wait_while(self, why):
+        assert not why()
 
     @contextmanager
     def following(self, look):

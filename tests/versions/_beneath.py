@@ -14,6 +14,7 @@ _OLDER: Final = "the releases beneath are older than Python 3.11"
 
 REASONS: Final[Mapping[str, str]] = {
     "canopen": _OLDER,
+    "cryptography": "of what meets a network, only releases of the last two years are tried",
     "jinja2": "the releases beneath have a published way out of the sandbox (CVE-2025-27516)",
     "keyring": _OLDER,
     "lark": _OLDER,
@@ -27,6 +28,9 @@ REASONS: Final[Mapping[str, str]] = {
     "pyserial": "it is the last release; the one before is of 2017",
     "python-can": "4.2 imports pkg_resources, which an environment of today need not have",
     "rich": _OLDER,
+    "starlette": "1.0 is the first release whose interface is promised to stay",
+    "uvicorn": "of what meets a network, only releases of the last two years are tried",
+    "websockets": "of what meets a network, only releases of the last two years are tried",
 }
 """Why a lower one was not tried although the tests might pass with it.
 

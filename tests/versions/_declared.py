@@ -11,7 +11,7 @@ from packaging.version import Version
 ROOT: Final = Path(__file__).parents[2]
 TRIED: Final = Path(__file__).with_name("tried.json")
 
-NEVER: Final = ("dev", "docs")
+NEVER: Final = ("dev", "browser", "docs")
 """Extras for people who work on robolink; using it needs none of them."""
 
 PYTHONS: Final = ("3.11", "3.12", "3.13", "3.14")

@@ -8,7 +8,7 @@ from typing import Final
 import click
 
 from robolink.messages import declared
-from robolink_cli.command_map import COMPANIONS, COMPUTER, CONTROLLER, MEASURE, SHIPPED
+from robolink_cli.command_map import COMPANIONS, COMPUTER, CONTROLLER, MEASURE, SHIPPED, SIMULATE
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import shared_options
 
@@ -117,6 +117,10 @@ _EXPERT: Final = {
     "completion": (
         f"{COMPUTER}.completion:completion",
         declared("Set up TAB completion."),
+    ),
+    "demo": (
+        f"{SIMULATE}.demo:demo",
+        declared("A whole needle change on a simulated robot; needs no machine."),
     ),
 }
 

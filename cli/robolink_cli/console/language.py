@@ -21,6 +21,7 @@ from robolink.locale.languages import (
     translator,
 )
 from robolink.messages import install, spoken, tr
+from robolink_cli.console.person import Person, person_here
 
 OPTION: Final = "--lang"
 VARIABLE: Final = "ROBOLINK_LANG"
@@ -237,6 +238,8 @@ def _of_windows() -> str:
 
 def _shown_here(language: str) -> bool:
     """Return whether the console has the characters, and say if not."""
+    if person_here() is Person.WIRE:
+        return True  # a page shows every character
     encoding = _unshown_here(language)
     if encoding is not None:
         _remark(

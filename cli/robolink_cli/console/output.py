@@ -22,6 +22,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Final, TextIO
 
 from robolink.interrupts import Interrupted, output_closed
+from robolink_cli.console.person import Person, is_terminal, person_here
 from robolink_cli.console.tables import filled, within
 
 if TYPE_CHECKING:
@@ -82,39 +83,6 @@ def help_width() -> int:
     return max(min(columns, 80) - 2, 50)
 
 
-def may_be_guided() -> bool:
-    """Return whether a person is at both ends of this process's terminal."""
-    try:
-        ends = [stream.fileno() for stream in (sys.stdin, sys.stderr)]
-        return all(os.isatty(end) and _is_no_other_device(end) for end in ends)
-    except (OSError, ValueError, AttributeError):  # closed, or a stream inside a program
-        return False
-
-
-def is_terminal(stream: TextIO | None) -> bool:
-    """Return whether a stream is a terminal, where a person can be."""
-    try:
-        return (
-            stream is not None
-            and stream.isatty()
-            and (os.name != "nt" or _is_no_other_device(stream.fileno()))
-        )
-    except (OSError, ValueError, AttributeError):  # closed, or a stream inside a program
-        return False
-
-
-def _is_no_other_device(descriptor: int) -> bool:
-    """Return whether a supposed terminal is one: on Windows NUL and a port claim it too."""
-    if sys.platform != "win32":
-        return True
-    import ctypes
-    import msvcrt
-
-    handle, mode = msvcrt.get_osfhandle(descriptor), ctypes.c_ulong()
-    console = ctypes.windll.kernel32
-    return bool(console.GetConsoleMode(ctypes.c_void_p(handle), ctypes.byref(mode)))
-
-
 _OBEYED: Final = (
     "[\x00-\x09\x0b-\x1f\x7f-\x9f"  # C0 without LF, DEL, C1
     "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]"  # line separators, direction of writing
@@ -151,9 +119,14 @@ def shown_by(shower: ShownBy) -> Iterator[None]:
         _shown_by = before
 
 
+def _is_shown_on(stream: TextIO) -> bool:
+    """Return whether the present writer shows what goes to a stream: a terminal, or the wire."""
+    return person_here() is Person.WIRE or is_terminal(stream)
+
+
 def drawn_elsewhere() -> bool:
     """Return whether somebody else draws on the terminal now."""
-    return _shown_by is not None and is_terminal(sys.stdout)
+    return _shown_by is not None and _is_shown_on(sys.stdout)
 
 
 def show(text: str, *, beside: bool = False) -> None:
@@ -163,7 +136,7 @@ def show(text: str, *, beside: bool = False) -> None:
         text: One line or several.
         beside: On stderr, beside the result.
     """
-    if _shown_by is not None and is_terminal(sys.stderr if beside else sys.stdout):
+    if _shown_by is not None and _is_shown_on(sys.stderr if beside else sys.stdout):
         _shown_by(visible(text), beside)
         return
     draw(text, beside=beside)

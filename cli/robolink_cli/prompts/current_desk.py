@@ -13,9 +13,12 @@ class AskingDesk(Protocol):
 
     Attributes:
         glance: Looks at the controller while a person is asked.
+        silent_s: Tells for how long nothing was heard of the person's page, in seconds; 0 where
+            the person is here.
     """
 
     glance: Callable[[], Any]
+    silent_s: Callable[[], float]
 
     def tell(self, text: str) -> None:
         """Show something that needs no answer."""
@@ -25,6 +28,9 @@ class AskingDesk(Protocol):
 
     def ask(self, question: str, kind: "Question") -> None:
         """Ask."""
+
+    def wait_while(self, why: Callable[[], str]) -> None:
+        """Wait as long as something keeps the work back, and say what."""
 
     def following(self, look: Callable[[], Any]) -> AbstractContextManager[None]:
         """Read the controller while it moves, for the block."""

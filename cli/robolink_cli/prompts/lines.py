@@ -15,7 +15,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any, Final, Protocol
 
-from robolink_cli.console.output import is_terminal
+from robolink_cli.console.person import is_terminal
 
 BURST_S: Final = 1.0
 """Longest wait in seconds for the end of a burst: a key held down never ends."""

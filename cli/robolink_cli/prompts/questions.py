@@ -5,7 +5,6 @@ that is typed and takes the tip farther than the cell allows asks who may: a sli
 sign or a unit takes it as far as no nozzle change explains.
 """
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Final
@@ -15,7 +14,7 @@ import click
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.output import is_terminal
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.declaration import CliOption
 
@@ -25,11 +24,6 @@ if TYPE_CHECKING:
 
 WATCHED: Final = "robolink.watched"
 """Key of the controller whose status a prompt must read while a person thinks."""
-
-
-def on_terminal() -> bool:
-    """Return whether a person can be asked."""
-    return is_terminal(sys.stdin) and is_terminal(sys.stderr)
 
 
 def agree(question: str, *, yes: bool, asks: bool = True) -> None:
@@ -45,7 +39,7 @@ def agree(question: str, *, yes: bool, asks: bool = True) -> None:
     """
     from robolink.model import AnsweredBy
 
-    if not yes and asks and on_terminal():
+    if not yes and asks and person_here():
         require_yes(question)
         return
     keep_answer(question, True, AnsweredBy.YES if yes else AnsweredBy.COMMAND)
@@ -184,7 +178,7 @@ def accepted_jump(
 
 
 def _ask(figure: str, findings: str) -> None:
-    if json_is_on() or not on_terminal():
+    if json_is_on() or not person_here():
         raise DeclinedError(
             findings,
             remedy=tr(

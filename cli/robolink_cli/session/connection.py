@@ -16,10 +16,12 @@ from robolink_cli.access.cell import acceleration_of, require_expected_robot
 from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on, note
-from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
+from robolink_cli.prompts.questions import WATCHED, asked
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import CELL, REACHED
+from robolink_cli.session.movement_permits import asking_for_permits
 from robolink_cli.session.operator_identity import signature_of
 from robolink_cli.session.stop_listener import (
     listening_for_stop,
@@ -104,6 +106,7 @@ def open_controller(
         remember_address(context)
         with (
             watched_at_desk(controller),
+            asking_for_permits(controller, url, context.cell),
             listening_for_stop(controller, context, looks=unhindered),
             _saying_what_is_left(
                 controller, context, quiet=quiet, looks=looks, calms=calms, leaves=leaves
@@ -263,7 +266,7 @@ def _offer_to_restore(controller: "Controller", markers: "Iterable[Marker]") -> 
     That comes before anything else is done. A no changes nothing and the command goes on. Nothing
     is asked of a script, nor where the controller is not in a state to be told anything.
     """
-    if json_is_on() or not on_terminal():
+    if json_is_on() or not person_here():
         return
     from robolink.model import MarkerKind
 

@@ -4,12 +4,12 @@ import os
 import shlex
 from collections.abc import Callable, Mapping
 from functools import wraps
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 import click
 
 from robolink.errors import ConfigError, NotReadyError
-from robolink.messages import tr
+from robolink.messages import declared, spoken, tr
 from robolink.model import Controller
 from robolink_cli.access.capabilities import require_epson
 from robolink_cli.access.cell import (
@@ -19,10 +19,11 @@ from robolink_cli.access.cell import (
     only_cell,
     which_cell,
 )
-from robolink_cli.console.output import may_be_guided
+from robolink_cli.console.person import Person, may_be_guided, person_here
 from robolink_cli.console.render import json_is_on, log_wanted, note
 from robolink_cli.options.declaration import add_declared, packed
 from robolink_cli.options.shared import GIVEN, TYPED, all_shared
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:
@@ -147,10 +148,34 @@ def _with_options(
 
     @wraps(command)
     def with_context(*args: object, **kwargs: object) -> int | None:
-        return call(context_of(kwargs), *args, **kwargs)
+        context = context_of(kwargs)
+        _name_at_the_wire(context)
+        return call(context, *args, **kwargs)
 
     framed: Command = add_declared(command, all_shared, with_context)
     return framed
+
+
+_JOBS: Final = {
+    "change": declared("Change needle"),
+    "recalibrate": declared("Change needle"),
+    "check": declared("Check the cell"),
+    "jog": declared("Jog"),
+    "learn": declared("Learn a station"),
+    "recover": declared("Recover"),
+    "release": declared("Release the stop"),
+    "reset": declared("Reset"),
+    "undo": declared("Undo a change"),
+}
+"""What commands are called in the first row; others by their name."""
+
+
+def _name_at_the_wire(context: CliContext) -> None:
+    """Show at the wire which cell and which job it is, before the first question."""
+    desk = current_desk()
+    if person_here() is Person.WIRE and desk is not None:
+        name = click.get_current_context().info_name or ""
+        desk.regard(header_of(context, spoken(_JOBS[name]) if name in _JOBS else name))
 
 
 def context_of_cell(name: str, *, anew: bool = False) -> CliContext:

@@ -8,6 +8,7 @@ import click
 from robolink.errors import DeclinedError, JournalError
 from robolink.messages import tr
 from robolink.model import EntryKind
+from robolink_cli.console.person import person_here
 from robolink_cli.prompts import questions
 from robolink_cli.prompts.questions import WATCHED
 from robolink_cli.stopping.notes import heed_stop
@@ -56,7 +57,7 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
         DeclinedError: The answer was no, or nobody could be asked.
     """
     from robolink_cli.console.render import json_is_on
-    from robolink_cli.prompts.questions import asked, on_terminal
+    from robolink_cli.prompts.questions import asked
 
     if controller.outcomes.open_markers():
         return  # they block it themselves, with more detail
@@ -67,7 +68,7 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
         "Nothing moved. Another program may have selected it. Select the tool that the cell "
         "file names: robolink tool select N"
     )
-    if yes or json_is_on() or not on_terminal():
+    if yes or json_is_on() or not person_here():
         raise DeclinedError(doubt, remedy=remedy)
     if not asked(tr("{doubt} Move with it anyway?", doubt=doubt)):
         raise DeclinedError(doubt, remedy=remedy)
@@ -131,7 +132,7 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
     if yes:
         questions.agree(question, yes=True)
         return
-    if not questions.on_terminal():
+    if not person_here():
         raise DeclinedError(
             tr("The robot would move, but there is nobody to ask."),
             remedy=tr("Add --yes when the cell is clear, or run it on a terminal."),

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import LINE
@@ -61,8 +62,8 @@ def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool
 
 
 def _asked_for_badge() -> str:
-    from robolink_cli.prompts.questions import asked_for_text, on_terminal
+    from robolink_cli.prompts.questions import asked_for_text
 
-    if json_is_on() or not on_terminal():
+    if json_is_on() or not person_here():
         return ""
     return LINE.convert(asked_for_text(tr("Who works here (badge or name)?")), None, None)

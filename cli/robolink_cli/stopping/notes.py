@@ -7,6 +7,7 @@ from robolink.messages import tr
 from robolink.model import is_own_name
 from robolink.stopping import StopNote, clear_note, find_note
 from robolink.transport import far_end_of
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
@@ -27,13 +28,13 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
             nobody had stopped, or there is no terminal.
         DeclinedError: The answer was no.
     """
-    from robolink_cli.prompts.questions import asked, on_terminal
+    from robolink_cli.prompts.questions import asked
 
     keys, name = far_end_of(url), own_name_of(controller)
     found = find_note(keys, name)
     if found is None:
         return
-    if yes or not on_terminal():
+    if yes or not person_here():
         raise StoppedError(
             found.sentence,
             remedy=tr("Look into the cell; then robolink robot release (or reset), or omit --yes."),

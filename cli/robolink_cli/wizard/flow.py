@@ -11,7 +11,6 @@ from robolink.calibration_run import ChangeReport
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.runner import (
-    SETTLING_S,
     FitSubject,
     JogSubject,
     MoveSubject,
@@ -26,6 +25,8 @@ from robolink_cli.wizard.happenings import (
     HasEnded,
     KeyPressed,
     LineTyped,
+    OffersAtTheEnd,
+    Pressed,
     Reading,
     SendAnswer,
     TaughtPoints,
@@ -38,16 +39,18 @@ from robolink_cli.wizard.happenings import (
     WizardCommand,
 )
 from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of
+from robolink_cli.wizard.places import not_yet
 from robolink_cli.wizard.questions_flow import (
+    PRESSED_AT_THE_END,
     answered_by_key,
     answered_by_line,
+    answered_by_press,
     chosen_by_key,
     chosen_by_line,
     into_field,
 )
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
-    LEAST_WAY_MM,
     STEP_SIZES,
     CheckSubject,
     ChoiceSubject,
@@ -57,6 +60,8 @@ from robolink_cli.wizard.state import (
     WizardState,
     subject_of,
 )
+from robolink_cli.wizard.views.offered import refusal
+from robolink_cli.wizard.views.view import view_of
 
 Advanced = tuple[WizardState, list[Effect]]
 
@@ -88,35 +93,8 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
             return _line(state, happening)
         case KeyPressed():
             return _key(state, happening)
-
-
-def not_yet(state: WizardState, at_s: float) -> str:
-    """Return why the place is refused so far, as known here; empty for nothing."""
-    touch, jogging = state.touch, state.jogging
-    if touch is None:
-        return ""
-    if at_s - jogging.ended_s < SETTLING_S:
-        return tr("Wait: the robot is still moving.")
-    arrived = touch.arrival is not None or state.carried
-    if touch.contact is None and arrived and not _brought(state):
-        return tr("Not yet: the tip is still where the robot stopped. Jog it onto the pin.")
-    if touch.contact is None and jogging.coarse:
-        return tr(
-            "Not yet: the last step was {mm} mm. Finish with 0.10 mm or less.",
-            mm=f"{jogging.longest:.2f}",
-        )
-    reading = state.reading
-    if reading is not None and at_s - reading.at_s > 1.0:
-        return tr("No reading from the controller for {s} s.", s=round(at_s - reading.at_s))
-    return ""
-
-
-def _brought(state: WizardState) -> bool:
-    """Return whether the tip was moved from where the robot stopped."""
-    way = state.way_mm()
-    if way is None:
-        return state.jogging.steps > 0
-    return max(map(abs, way)) >= LEAST_WAY_MM / 2 and state.jogging.steps > 0
+        case Pressed():
+            return _press(state, happening)
 
 
 def _regarding(state: WizardState, subject: object) -> WizardState:
@@ -142,6 +120,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
     if isinstance(subject, CellIs):
         return _known(state, subject.simulated, subject.needle)
+    if isinstance(subject, OffersAtTheEnd):
+        return replace(state, offers=subject.offers)
     if isinstance(subject, TaughtPoints):
         return replace(state, impact=subject.impact)
     if isinstance(subject, ChangeReport):
@@ -193,6 +173,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         subject=subject,
         reading=reading,
         question=asked,
+        asked=asked.number,
         fresh=(),
         heard=state.fresh,
         page=0,
@@ -280,6 +261,45 @@ def _key(state: WizardState, key: KeyPressed) -> Advanced:
     if state.at_place:
         return _key_at_place(state, key)
     return _taken(state, answered_by_key(state, key))
+
+
+def _press(state: WizardState, press: Pressed) -> Advanced:
+    """Carry out what a view offered; anything else only says why it does nothing."""
+    why = refusal(view_of(state, press.at_s), press)
+    if why:
+        return state.says(why), []
+    shown_s = state.question.at_s if state.question is not None else -math.inf
+    if state.ended is not None:
+        shown_s = state.ended.at_s
+    ends = press.action == "leave" and state.ended is None
+    if press.at_s - shown_s < ARMED_AFTER_S and not ends:
+        return state.says(tr("Pressed too early and ignored. Press it again.")), []
+    if state.ended is not None:
+        return _last(state, PRESSED_AT_THE_END[press.action])
+    if ends:
+        return _stop(state)
+    if state.at_place:
+        return _press_at_place(state, press)
+    return _taken(state, answered_by_press(state, press))
+
+
+def _press_at_place(state: WizardState, press: Pressed) -> Advanced:
+    jogging, value = state.jogging, press.value
+    match press.action:
+        case "jog":
+            return _jog(state, value, press.at_s)
+        case "size":
+            sized = replace(jogging, size=STEP_SIZES.index(float(value)))
+            return replace(state, jogging=sized, message=""), []
+        case "turn":
+            turned = replace(jogging, quarters=(jogging.quarters + 1) % 4)
+            return replace(state, jogging=turned, message=""), []
+        case "again":
+            return _again(state, int(value) if value else None)
+        case "pose":
+            return _pose_typed(state, value)
+        case _:
+            return _take(state, press.at_s)
 
 
 def stops_at_once(state: WizardState, name: str) -> bool:

@@ -137,6 +137,23 @@ class LineTyped:
 
 
 @dataclass(frozen=True, slots=True)
+class Pressed:
+    """Something was pressed that a view showed.
+
+    Attributes:
+        number: Of the view that was there when the finger went down.
+        action: Name of the action.
+        value: What goes with it.
+        at_s: When it arrived.
+    """
+
+    number: int
+    action: str
+    value: str
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class TooFast:
     """A burst of characters, as from a scanner or a paste, was ignored."""
 
@@ -160,6 +177,7 @@ Happening = (
     | WasRead
     | KeyPressed
     | LineTyped
+    | Pressed
     | TooFast
     | HasEnded
 )
@@ -190,6 +208,17 @@ class WizardCommand(Enum):
 
     NEXT_TOOL = "next tool"
     """Choose another job, starting at the first list."""
+
+
+@dataclass(frozen=True, slots=True)
+class OffersAtTheEnd:
+    """What the last screen offers beside leaving it, where the job is carried out.
+
+    Attributes:
+        offers: That.
+    """
+
+    offers: frozenset[WizardCommand]
 
 
 Effect = SendAnswer | WizardCommand

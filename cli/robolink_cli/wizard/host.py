@@ -3,18 +3,20 @@
 import os
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Final, TypeVar
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, TypeVar
 
 import click
 
 from robolink.errors import RobolinkError
 from robolink_cli.console.output import PLAIN, shown_by
+from robolink_cli.console.person import Person, person_at
 from robolink_cli.console.render import note
-from robolink_cli.prompts.current_desk import sitting_at
-from robolink_cli.wizard.happenings import WizardCommand
-from robolink_cli.wizard.screens.end import ended_of, kept_lines
+from robolink_cli.prompts.current_desk import current_desk, sitting_at
+from robolink_cli.wizard.ending import ended_of, kept_lines
+from robolink_cli.wizard.happenings import OffersAtTheEnd, WizardCommand
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Desk, Face, Work
 
@@ -58,6 +60,82 @@ def draws_whole_screens() -> bool:
 T = TypeVar("T")
 
 
+@dataclass(slots=True)
+class _Offers:
+    """What follows on the last screen, and the command in which it is done.
+
+    Attributes:
+        report: Writes the page about a change, by its id; ``None`` where none is offered.
+        following: The work for the next tool; ``None`` for none.
+        context: Of the command.
+    """
+
+    report: Callable[[str], tuple[str, ...]] | None = None
+    following: Callable[[], Any] | None = None
+    context: click.Context | None = None
+
+    def named(self) -> frozenset[WizardCommand]:
+        """Return what is offered."""
+        offers = set()
+        if self.report is not None:
+            offers.add(WizardCommand.SHOW_REPORT)
+        if self.following is not None:
+            offers.add(WizardCommand.NEXT_TOOL)
+        return frozenset(offers)
+
+
+@dataclass(slots=True)
+class _Wire:
+    """The wire at which the person of this process is.
+
+    Attributes:
+        face: Shows the command there.
+        kept: What stays of it when the last screen is gone.
+        offers: Of the job that is under way.
+    """
+
+    face: Face
+    kept: list[str] = field(default_factory=list)
+    offers: _Offers = field(default_factory=_Offers)
+
+
+_wire: _Wire | None = None
+
+
+@contextmanager
+def shown_on(face: Face) -> Iterator[list[str]]:
+    """Show every command of this process on a face at a wire, for the block.
+
+    Yields:
+        What stays of it, a sentence each.
+    """
+    global _wire  # noqa: PLW0603 - a process has one person
+    before, _wire = _wire, _Wire(face)
+    try:
+        with person_at(Person.WIRE):
+            yield _wire.kept
+    finally:
+        _wire = before
+
+
+def whole_command(header: Header, command: Callable[[], T]) -> T:
+    """Carry out a command line; at a wire, whatever it asks and shows goes there.
+
+    Args:
+        header: The first row, until the command knows better.
+        command: The command line; it may be carried out again from its last screen.
+
+    Raises:
+        BaseException: Whatever ended it.
+    """
+    if _wire is None:
+        return command()
+    _wire.offers = _Offers()
+    state, work = _turns(_wire.face, header, command, _wire.offers)
+    _wire.kept += _left_of(state, work.error)
+    return _result(work)
+
+
 def guided(
     header: Header,
     do: Callable[[], T],
@@ -65,7 +143,7 @@ def guided(
     report: Callable[[str], tuple[str, ...]] | None = None,
     following: Callable[[], T] | None = None,
 ) -> T:
-    """Do the work of a command, guided by a face on this process's terminal.
+    """Do the work of a command, guided by a face on this process's terminal, or at the wire.
 
     Args:
         header: What stands in the first row.
@@ -77,23 +155,44 @@ def guided(
     Raises:
         BaseException: Whatever ended the work.
     """
-    face, offers = face_here(), set()
-    if report is not None:
-        offers.add(WizardCommand.SHOW_REPORT)
-    if following is not None:
-        offers.add(WizardCommand.NEXT_TOOL)
+    offers = _Offers(report, following, click.get_current_context(silent=True))
+    desk = current_desk()
+    if _wire is not None and desk is not None:
+        # The whole command is shown there already.
+        _wire.offers.report, _wire.offers.following = report, following
+        _wire.offers.context = offers.context
+        desk.regard(header)
+        desk.regard(OffersAtTheEnd(offers.named()))
+        return do()
+    state, work = _turns(face_here(), header, do, offers)
+    if lines := _left_of(state, work.error):
+        note("\n".join(lines))
+    return _result(work)
+
+
+def _turns(
+    face: Face, header: Header, do: Callable[[], T], offers: _Offers
+) -> "tuple[WizardState, Work[T]]":
+    """Show the work, and what follows from its last screen, until a person leaves it."""
+    context, number = None, 0
     while True:
-        desk, work = Desk(), Work(do)
+        desk, work = Desk(after=number), Work(do, context)
+        state = WizardState(header, offers=offers.named(), asked=number)
         with sitting_at(desk), shown_by(lambda text, _beside: desk.tell(text)):  # noqa: B023 - used inside the turn
             work.start()
-            state = _shown(face, desk, WizardState(header, offers=frozenset(offers)), work)
-        while state.wants is WizardCommand.SHOW_REPORT and report is not None:
-            state = _shown(face, desk, _reported(state, report), work)
-        _leave(state, work.error)
-        if state.wants is WizardCommand.NEXT_TOOL and following is not None:
-            do = following
+            state = _shown(face, desk, state, work)
+        while state.wants is WizardCommand.SHOW_REPORT and offers.report is not None:
+            state = _shown(face, desk, _reported(state, offers.report), work)
+        number = state.screen_number
+        if state.wants is WizardCommand.NEXT_TOOL and offers.following is not None:
+            do, context = offers.following, offers.context
         elif state.wants is not WizardCommand.BEGIN_AGAIN:
-            break
+            return state, work
+        if lines := _left_of(state, work.error):
+            note("\n".join(lines))
+
+
+def _result(work: "Work[T]") -> T:
     if work.error is not None:
         raise work.error
     return work.result  # type: ignore[return-value]
@@ -137,12 +236,12 @@ def _ends_alone(desk: Desk, work: "Work[T]") -> None:
         pass
 
 
-def _leave(state: WizardState, error: BaseException | None) -> None:
-    """Print what stays when the screen is gone."""
+def _left_of(state: WizardState, error: BaseException | None) -> tuple[str, ...]:
+    """Return what stays when the screen is gone."""
     ended = state.ended or ended_of(state, error, 0.0)
-    lines = ended.kept if ended is not None else (*kept_lines(state, error), *_unread(state, error))
-    if lines:
-        note("\n".join(lines))
+    if ended is not None:
+        return ended.kept
+    return (*kept_lines(state, error), *_unread(state, error))
 
 
 def _unread(state: WizardState, error: BaseException | None) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import Final
 from robolink.calibration_run import WriteSubject
 from robolink.messages import tr
 from robolink.runner import BACK, MORE, FitSubject, Question
-from robolink_cli.wizard.happenings import KeyPressed, WizardCommand
+from robolink_cli.wizard.happenings import KeyPressed, Pressed, WizardCommand
 from robolink_cli.wizard.keys import folded, meaning_of
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
@@ -100,6 +100,41 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
     if meaning in ("yes", "no"):
         return meaning[0]
     return state.says(tr("Type y or n."))
+
+
+def answered_by_press(state: WizardState, press: Pressed) -> Answered:
+    """Return the answer of a press that the view offers; see ``views.offered``."""
+    subject = state.subject
+    match press.action, subject:
+        case "choose", _:
+            return press.value
+        case "language", _:
+            return CHANGE_LANGUAGE
+        case "confirm", CheckSubject() as check:
+            names = [point.name for point in check.rows]
+            return _confirmed(state, check, names.index(press.value))
+        case "write", WriteSubject() as writes:
+            return _write(state, writes, folded(press.value), said_no=False)
+        case "again", WriteSubject():
+            return BACK
+        case "answer", _:
+            return press.value.strip() or state.says(tr("Nothing was typed."))
+        case "more", _:
+            return MORE
+        case (("yes" | "start" | "again"), _):
+            return "y"
+        case _:
+            return "n"  # no, reject, go_on
+
+
+PRESSED_AT_THE_END: Final = {
+    "finish": WizardCommand.LEAVE,
+    "leave": WizardCommand.LEAVE,
+    "begin_again": WizardCommand.BEGIN_AGAIN,
+    "report": WizardCommand.SHOW_REPORT,
+    "next": WizardCommand.NEXT_TOOL,
+}
+"""What the actions of the last screen choose."""
 
 
 def chosen_by_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> WizardCommand | None:

@@ -210,6 +210,7 @@ class LastScreen:
         at_s: When.
         headed: Whether it was carried out, stopped, or never begun, as the first row says it.
         again: Whether the job may be begun once more from here.
+        blocked: Whether the robot accepts only ``recover``.
     """
 
     done: bool
@@ -218,6 +219,7 @@ class LastScreen:
     at_s: float
     headed: str = ""
     again: bool = True
+    blocked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,6 +254,7 @@ class WizardState:
         ended: The last screen, ``None`` before it.
         offers: What the last screen offers beside leaving it, where the job was carried out.
         wants: What the person chose there; ``None`` for leaving, and before.
+        asked: Number of the last question, 0 before the first.
     """
 
     header: Header
@@ -280,10 +283,18 @@ class WizardState:
     ended: LastScreen | None = None
     offers: frozenset[WizardCommand] = frozenset()
     wants: WizardCommand | None = None
+    asked: int = 0
 
     def says(self, message: str) -> "WizardState":
         """Return the same with another message."""
         return replace(self, message=message)
+
+    @property
+    def screen_number(self) -> int:
+        """Number of what can be pressed: of the question, or one more for the last screen."""
+        if self.ended is not None:
+            return self.asked + 1
+        return 0 if self.question is None else self.question.number
 
     @property
     def at_place(self) -> bool:

@@ -5,7 +5,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 import click
@@ -14,6 +14,7 @@ from robolink.errors import DeclinedError, RobolinkError
 from robolink.interrupts import heard_by_this_thread, heed
 from robolink.messages import tr
 from robolink.runner import MoveSubject, Question
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.wizard.happenings import (
     Happening,
     Reading,
@@ -38,18 +39,20 @@ class Desk:
 
     Args:
         now_s: A monotonic clock of this computer, in seconds.
+        after: Number of what was shown last: a press of then does not answer a question of now.
     """
 
-    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, now_s: Callable[[], float] = time.monotonic, after: int = 0) -> None:
         self._now_s = now_s
         self._happened: queue.SimpleQueue[Happening] = queue.SimpleQueue()
         self._answers: queue.SimpleQueue[SendAnswer] = queue.SimpleQueue()
-        self._number = 0
+        self._number = after
         self._told_waiting = False
         self._gone = False
         self._looked_s = 0.0
         self._moves = threading.Event()
         self.glance: Callable[[], Reading | None] = lambda: None
+        self.silent_s: Callable[[], float] = lambda: 0.0
 
     def tell(self, text: str) -> None:
         """Show a line."""
@@ -82,11 +85,7 @@ class Desk:
             self._happened.put(WaitsForAnswer(self._number, self._now_s()))
         while True:
             heed()
-            if self._gone:
-                raise DeclinedError(
-                    tr("The keyboard is gone. Nothing was answered for you."),
-                    remedy=tr("Run it on a terminal, or with --assist on a simulator."),
-                )
+            self._require_somebody()
             left_s = end_s - self._now_s()
             try:
                 answer = self._answers.get(timeout=max(0.0, min(GLANCE_S, left_s)))
@@ -99,6 +98,40 @@ class Desk:
             if answer.number == self._number:
                 self._told_waiting = False
                 return answer.text
+
+    def wait_while(self, why: Callable[[], str]) -> None:
+        """Wait as long as something keeps the work back; say what, and read the controller.
+
+        Args:
+            why: Returns what keeps it back, empty for nothing.
+
+        Raises:
+            DeclinedError: There is nobody any more who could change that.
+            Interrupted: The work is to end.
+        """
+        told = ""
+        while reason := why():
+            heed()
+            self._require_somebody()
+            if reason != told:
+                self.tell(reason)
+                told = reason
+            self._look()
+            time.sleep(GLANCE_S)
+        if told:
+            self.tell(tr("The robot goes on."))
+
+    def _require_somebody(self) -> None:
+        if self._gone and person_here() is Person.WIRE:
+            raise DeclinedError(
+                tr("The panel is gone. Nothing was answered for you."),
+                remedy=tr("Start the job again from its page."),
+            )
+        if self._gone:
+            raise DeclinedError(
+                tr("The keyboard is gone. Nothing was answered for you."),
+                remedy=tr("Run it on a terminal, or with --assist on a simulator."),
+            )
 
     @contextmanager
     def following(self, look: Callable[[], Reading | None]) -> Iterator[None]:
@@ -158,16 +191,20 @@ T = TypeVar("T")
 class Work(Generic[T]):
     """The work of one command in its thread.
 
+    Args:
+        do: The work.
+        context: The command's; by default that of the caller, if there is one by now.
+
     Attributes:
         result: What it returned.
         error: What ended it.
     """
 
-    def __init__(self, do: Callable[[], T]) -> None:
+    def __init__(self, do: Callable[[], T], context: click.Context | None = None) -> None:
         self._do = do
         self._ended = threading.Event()
         self._begun = threading.Event()
-        self._click = click.get_current_context()
+        self._click = context or click.get_current_context(silent=True)
         self.result: T | None = None
         self.error: BaseException | None = None
 
@@ -186,9 +223,12 @@ class Work(Generic[T]):
         """Wait for its end for so long; return whether it has come."""
         return self._ended.wait(seconds)
 
+    def _scope(self) -> AbstractContextManager[object]:
+        return nullcontext() if self._click is None else self._click.scope(cleanup=False)
+
     def _run(self) -> None:
         try:
-            with self._click.scope(cleanup=False), heard_by_this_thread():
+            with self._scope(), heard_by_this_thread():
                 self._begun.set()
                 self.result = self._do()
         except BaseException as error:

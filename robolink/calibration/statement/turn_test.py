@@ -60,7 +60,7 @@ _HALVINGS: Final = 16
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class TurnView:
     """The limit of one drift, and the scatter of each of its coordinates.
 
     Attributes:
@@ -79,7 +79,7 @@ class View:
         return math.sqrt(max(self.limit_mm**2 - aside, 0.0))
 
 
-def shows_from_mm(views: Sequence[View], coordinates: int, nu: float | None) -> float:
+def shows_from_mm(views: Sequence[TurnView], coordinates: int, nu: float | None) -> float:
     """Return the smallest shift of the tip that a test shows in 95 %.
 
     Args:
@@ -88,8 +88,8 @@ def shows_from_mm(views: Sequence[View], coordinates: int, nu: float | None) -> 
         nu: Degrees of freedom of their scatter, ``None`` where it is known.
 
     Example:
-        >>> from robolink.calibration.statement.turn_test import View, shows_from_mm
-        >>> one = View(limit_mm=0.0526, own_mm=0.01, shared_mm=0.01)
+        >>> from robolink.calibration.statement.turn_test import TurnView, shows_from_mm
+        >>> one = TurnView(limit_mm=0.0526, own_mm=0.01, shared_mm=0.01)
         >>> round(shows_from_mm((one,), 2, None), 4), round(shows_from_mm((one, one), 2, None), 4)
         (0.0739, 0.0662)
     """
@@ -110,7 +110,7 @@ def shows_from_mm(views: Sequence[View], coordinates: int, nu: float | None) -> 
     return max(found, nearest + wider * (found - nearest))
 
 
-def _missed(shift_mm: float, limits: Sequence[tuple[View, float]]) -> float:
+def _missed(shift_mm: float, limits: Sequence[tuple[TurnView, float]]) -> float:
     """Return the probability that no drift shows a shift, whatever part they share."""
     missed = 0.0
     for node, weight in _NODES:
@@ -413,7 +413,7 @@ def _shows_from_mm(claim: TurnClaim, proof: VerifyResult, limits: Sequence[Drift
         allowed_mm = min(limit.repeatable_mm, proof.tolerance_mm - GUARD_FACTOR * drift.u_mm)
         scatter = limit.repeatable_mm**2 / quantile
         own = min(claim.look_sigma_mm**2 / drift.looks, scatter)
-        views.append(View(max(allowed_mm, 0.0), math.sqrt(own), math.sqrt(scatter - own)))
+        views.append(TurnView(max(allowed_mm, 0.0), math.sqrt(own), math.sqrt(scatter - own)))
     return shows_from_mm(views, coordinates, claim.look_nu)
 
 

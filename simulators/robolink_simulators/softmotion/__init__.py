@@ -1,6 +1,6 @@
 """A simulated CODESYS SoftMotion axis group: SIMULATED, no runtime system is involved.
 
-What is simulated and on what evidence stands in docs/simulated-softmotion.md; the facts are
+What is simulated and on what evidence stands in docs/reference/simulated-softmotion.md; the facts are
 those of docs/reference/softmotion.md.
 """
 

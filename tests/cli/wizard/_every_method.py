@@ -15,6 +15,7 @@ import click
 from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_cli.session.check_before_start import check_before_start
+from robolink_cli.wizard.ending import ended_of
 from robolink_cli.wizard.faces.lines import carry_out
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.glance import ControllerGlance
@@ -26,7 +27,6 @@ from robolink_cli.wizard.happenings import (
     TooFast,
     WaitsForAnswer,
 )
-from robolink_cli.wizard.screens.end import ended_of
 from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.screens.sentences import told_before, told_question
 from robolink_cli.wizard.state import CheckSubject, Header, Mark, WizardState

@@ -18,11 +18,10 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.screens.choice import choice_screen
 from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.screens.sentences import told_question
-from robolink_cli.wizard.screens.touch import instruction
 from robolink_cli.wizard.state import STEP_SIZES, CheckPoint, ChoiceSubject, LastScreen, Mark
+from robolink_cli.wizard.views.place import instruction
 
 from robolink.model import Path as Way
 from robolink.model import Pose
@@ -91,12 +90,10 @@ def test_a_take_right_after_a_step_is_not_meant_for_it():
 
 @pytest.mark.parametrize("quarters", range(4))
 def test_turned_keys_still_name_what_they_do(quarters):
-    from robolink_cli.wizard.screens.touch import touch_screen
-
     hand = at_touch()
     for _ in range(quarters):
         hand.key("tab")
-    rows = "\n".join(touch_screen(hand.state, hand.now).lines)
+    rows = "\n".join(screen_of(hand.state, hand.now).lines)
     for key in "6842":
         axis = rows[rows.index(f"[{key}] ") + 4 :][:2]
         other = at_touch()
@@ -552,7 +549,7 @@ def test_what_is_no_pin_is_named_by_whoever_asks_for_it(subject):
 def test_what_is_chosen_from_is_seen_however_much_there_is_to_be_read_above():
     subject = ChoiceSubject("Recover", ("What we read: " + "one tool more. " * 12,) * 6, CHOICES)
     hand = Sitting().asked(subject, kind=Question.TEXT, text="Which needle is mounted?")
-    rows = choice_screen(hand.state, subject, hand.now).rows()
+    rows = screen_of(hand.state, hand.now).rows()
     assert len(rows) == 24
     text = "\n".join(rows)
     assert all(option in text for option in CHOICES)

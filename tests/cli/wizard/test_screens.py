@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from robolink_cli.wizard.ending import ended_of
 from robolink_cli.wizard.happenings import (
     HasEnded,
     Reading,
@@ -14,7 +15,6 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.screens.end import ended_of
 from robolink_cli.wizard.screens.layout import broken, key_rows
 from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.screens.sentences import told_before, told_question
@@ -554,7 +554,7 @@ def test_how_long_a_movement_takes_is_said_where_it_is_known():
 
 
 def test_the_picture_finds_the_elbow_by_angles_alone():
-    from robolink_cli.wizard.screens.move import elbow_of
+    from robolink_cli.wizard.views.moving import elbow_of
 
     assert elbow_of(Pose(349.3, 442.9, -60.0, 0.0), SCARA) == pytest.approx((111.2, 305.4), abs=1.0)
     assert elbow_of(ARRIVAL, ()) is None
@@ -564,7 +564,7 @@ def test_the_picture_finds_the_elbow_by_angles_alone():
 
 @pytest.mark.parametrize(("upper", "fore"), [(400.0, 100.0), (100.0, 400.0)])
 def test_either_link_of_an_arm_may_be_the_short_one(upper, fore):
-    from robolink_cli.wizard.screens.move import elbow_of
+    from robolink_cli.wizard.views.moving import elbow_of
 
     elbow = elbow_of(Pose(upper, fore, -60.0, 90.0), (0.0, 90.0))
     assert elbow == pytest.approx((upper, 0.0))

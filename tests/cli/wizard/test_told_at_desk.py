@@ -17,8 +17,7 @@ from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import context_of_cell
 from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
-from robolink_cli.wizard.screens.choice import point_rows
-from robolink_cli.wizard.screens.layout import JobStep, status_row, title_row
+from robolink_cli.wizard.screens.layout import status_row, title_row
 from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.screens.sentences import told_before
 from robolink_cli.wizard.state import (
@@ -29,6 +28,7 @@ from robolink_cli.wizard.state import (
     Mark,
     WizardState,
 )
+from robolink_cli.wizard.views.frame import JobStep, head_of, status_of
 from robolink_cli.wizard.work import Desk
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
@@ -128,10 +128,10 @@ def test_nothing_of_a_proposal_is_left_out_before_it_is_written(count):
 
 
 def test_the_state_row_says_nothing_that_was_not_read():
-    state = WizardState(HEADER, reading=Reading(10.0, "ready"))
-    assert status_row(state, 10.0) == "READY   reading 0.0 s"
-    state = WizardState(HEADER, reading=Reading(10.0, "ready", motors=False, low_power=False))
-    assert status_row(state, 10.0) == "READY   motors OFF   power HIGH   reading 0.0 s"
+    reading = Reading(10.0, "ready")
+    assert status_row(status_of(reading, 10.0)) == "READY   reading 0.0 s"
+    reading = Reading(10.0, "ready", motors=False, low_power=False)
+    assert status_row(status_of(reading, 10.0)) == "READY   motors OFF   power HIGH   reading 0.0 s"
 
 
 def test_power_and_motors_are_those_of_the_controller():
@@ -244,7 +244,7 @@ def test_a_list_says_which_backup_there_is_on_this_computer(tmp_path, monkeypatc
 def test_a_backup_that_is_missing_keeps_nobody_from_starting():
     points = (CheckPoint(Mark.LOOK, "No backup."), CheckPoint(Mark.YOU, "Clear.", "clear", "Yes"))
     hand = Sitting().asked(CheckSubject(points, ""), Question.YES_NO)
-    assert point_rows(points[0], frozenset(), marked=False)[0].split()[0] == "LOOK"
+    assert screen_of(hand.state, hand.now).lines[0].split()[0] == "LOOK"
     assert hand.keys("2", "5", "2", "5").sent == ["y"]
 
 
@@ -429,18 +429,23 @@ def test_where_there_is_no_recipe_one_that_fits_is_copied_and_not_run(tmp_path, 
 def test_the_step_is_numbered_where_that_cuts_nothing_off():
     header = replace(HEADER, job="Change needle", simulated=True)
     state = WizardState(header)
-    assert title_row(state, "Check", JobStep.CHECK)[1] == "2 of 7  Check  SIMULATED"
-    assert title_row(state, "Question")[1] == "Question  SIMULATED"
+    assert title_row(head_of(state, "Check", JobStep.CHECK))[1] == "2 of 7  Check  SIMULATED"
+    assert title_row(head_of(state, "Question"))[1] == "Question  SIMULATED"
     for cell, said in (("c" * 37, "2 of 7  Check  SIMULATED"), ("c" * 38, "Check  SIMULATED")):
         left, right = title_row(
-            replace(state, header=replace(header, cell=cell)), "Check", JobStep.CHECK
+            head_of(replace(state, header=replace(header, cell=cell)), "Check", JobStep.CHECK)
         )
         assert (left, right) == (f"{cell}   Change needle", said)
     assert (
-        title_row(replace(state, header=replace(header, steps=0)), "x", JobStep.CHECK)[1][0] == "x"
+        title_row(head_of(replace(state, header=replace(header, steps=0)), "x", JobStep.CHECK))[1][
+            0
+        ]
+        == "x"
     )
     shorter = replace(state, header=replace(header, steps=6))
-    assert title_row(shorter, "On the way", JobStep.TURN_TEST)[1].startswith("6 of 6  On the way")
+    assert title_row(head_of(shorter, "On the way", JobStep.TURN_TEST))[1].startswith(
+        "6 of 6  On the way"
+    )
 
 
 @pytest.mark.parametrize(("keys", "number"), [(("1", "*"), "7 of 7"), (("n",), "3 of 7")])

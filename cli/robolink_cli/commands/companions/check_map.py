@@ -26,9 +26,9 @@ from robolink.register_maps import (
     values_of,
 )
 from robolink.timing import local_label
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on, note, say, table
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
 
@@ -295,7 +295,7 @@ class MapComparison:
             MapDiffersError: A value differs.
             DeclinedError: Nobody can be asked and nothing is compared, or the person ended it.
         """
-        if not on_terminal():
+        if not person_here():
             if wanted := self._wanted(values):
                 self._require_some(wanted)
             return

@@ -17,11 +17,11 @@ from robolink.model import Controller
 from robolink.recipe import LoadedRecipe, load_recipe
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, note, say
 from robolink_cli.options.consent import Published
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
-from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.completion import complete_recipe
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, context_of_cell, optional_controller
@@ -278,7 +278,7 @@ class SensorCheck:
                 remedy=tr("Name the cell."),
             )
         loaded = load_recipe(recipe)
-        if not on_terminal():
+        if not person_here():
             raise DeclinedError(
                 tr("The robot would move, but there is nobody to ask."),
                 remedy=tr(

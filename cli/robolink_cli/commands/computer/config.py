@@ -9,10 +9,11 @@ import click
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, emit_json, json_is_on, note, say
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.prompts.questions import asked_for_text, on_terminal
+from robolink_cli.prompts.questions import asked_for_text
 from robolink_cli.session.context import CliContext, optional_controller
 
 _LEFT_OUT = "-"
@@ -54,7 +55,7 @@ def new_cell(
     """
     from robolink.config import add_cell, content_with_cell
 
-    asks = on_terminal() and not json_is_on()
+    asks = person_here() and not json_is_on()
     if not asks and (name is None or url is None):
         raise DeclinedError(
             tr("A cell needs a name and a URL, and there is nobody to ask."),

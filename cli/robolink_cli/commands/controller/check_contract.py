@@ -241,6 +241,7 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
         DeclinedError: No, or nobody could be asked.
         NotReadyError: Nothing can move now.
     """
+    from robolink_cli.console.person import person_here
     from robolink_cli.prompts import questions
     from robolink_cli.session.motion_consent import (
         agree_to_motion,
@@ -265,7 +266,7 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
         return
     heed_what_was_left(yes=asked.yes, in_tool=False)
     if not asked.yes:
-        if not questions.on_terminal():
+        if not person_here():
             raise DeclinedError(
                 tr("A tool would be written for the checks, but there is nobody to ask."),
                 remedy=tr("Add --yes when nobody uses the controller, or run it on a terminal."),

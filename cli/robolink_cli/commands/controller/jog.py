@@ -10,7 +10,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.output import may_be_guided
+from robolink_cli.console.person import may_be_guided
 from robolink_cli.console.render import emit, show_requests
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption

@@ -9,12 +9,13 @@ from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.access.warnings import note_unsettled
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, note, say, show_requests
 from robolink_cli.console.shell_words import state_word
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import shared_options
-from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.prompts.questions import agree
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (
     CliContext,
@@ -134,7 +135,7 @@ def reset(
             show_requests(controller.preview(Act.RESET))
             return
         effect, told = _effect_of_reset(controller)
-        if told and (yes or not on_terminal()):
+        if told and (yes or not person_here()):
             note(effect)  # there is no question, so the effect is shown before it is sent
         with controller.latch.calming(str(Act.RESET)):
             agree(tr("{effect} Reset now?", effect=effect), yes=yes)
@@ -312,7 +313,7 @@ def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
     Raises:
         DeclinedError: The answer was no, or nobody could be asked.
     """
-    if not yes and not on_terminal():
+    if not yes and not person_here():
         raise DeclinedError(
             tr(
                 "Client {holder} has the mailbox of {controller} locked, and there is "

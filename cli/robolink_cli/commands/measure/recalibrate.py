@@ -153,7 +153,7 @@ def recalibrate(
     """
     from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
     from robolink_cli.commands.measure.recipe_choice import nobody_to_ask
-    from robolink_cli.console.output import may_be_guided
+    from robolink_cli.console.person import may_be_guided
     from robolink_cli.console.render import note
     from robolink_cli.session.context import guided_if_alone
 

@@ -21,10 +21,11 @@ from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.console.exit_codes import error_body, exit_code
 from robolink_cli.console.output import drawn_elsewhere, hand_over
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, note, say, switch_json_on
 from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.questions import asked, keep_answer, on_terminal
+from robolink_cli.prompts.questions import asked, keep_answer
 from robolink_cli.session.check_before_start import check_before_start, name_the_needle
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext
@@ -184,7 +185,7 @@ class RunOptions:
     @property
     def alone(self) -> bool:
         """Whether nobody, not even a simulator, could answer a question."""
-        return self.assist_url is None and not on_terminal()
+        return self.assist_url is None and not person_here()
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,7 +352,7 @@ class Recalibration:
                 "and writes nothing. Later changes are measured against it."
             )
         )
-        if not on_terminal():
+        if not person_here():
             raise DeclinedError(
                 tr("This needs a reference first, but there is nobody to ask."),
                 remedy=tr(

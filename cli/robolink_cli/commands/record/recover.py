@@ -11,11 +11,11 @@ from robolink.timing import local_label
 from robolink.transaction import Recovery, look
 from robolink_cli.commands.measure.recipe_choice import context_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.prompts.current_desk import current_desk
-from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (
     CliContext,
@@ -209,7 +209,7 @@ def resolve(
     """Same as 'robolink recover'; without a terminal, giving the command is your answer."""
     with open_controller(context, quiet=True, changes=not dry_run) as controller:
         by = AnsweredBy.YES if yes else AnsweredBy.COMMAND
-        guide = Guide(controller, keep=False, word=yes or not on_terminal(), by=by)
+        guide = Guide(controller, keep=False, word=yes or not person_here(), by=by)
         done, forgotten = _gone_through(guide, forget=forget, yes=yes, dry_run=dry_run)
         payload = guide.payload(done)
     document: dict[str, object] = {
@@ -223,7 +223,7 @@ def resolve(
 
 def _somebody_there() -> bool:
     """Whether a person can agree to movements, and move the tip onto the pin."""
-    return current_desk() is not None or (on_terminal() and not json_is_on())
+    return current_desk() is not None or (bool(person_here()) and not json_is_on())
 
 
 def _gone_through(guide: Guide, *, forget: bool, yes: bool, dry_run: bool) -> tuple[Recovery, int]:

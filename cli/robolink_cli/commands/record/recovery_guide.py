@@ -10,9 +10,10 @@ from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Pose, be
 from robolink.stations import StationKind
 from robolink.timing import local_label
 from robolink.transaction import Recovery, Settler, look, recover
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on, note, say
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.questions import agree, asked, keep_answer, on_terminal
+from robolink_cli.prompts.questions import agree, asked, keep_answer
 from robolink_cli.session.check_before_start import agree_to_procedure
 from robolink_cli.views.documents import finding_payload, pose_payload
 
@@ -159,7 +160,7 @@ class Guide:
             if self._by is not None:
                 keep_answer(question, True, self._by)
             return True
-        if json_is_on() or not on_terminal():
+        if json_is_on() or not person_here():
             return False
         agreed = asked(question)
         self.declined = self.declined or not agreed

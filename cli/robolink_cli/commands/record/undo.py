@@ -10,10 +10,11 @@ from robolink.messages import tr
 from robolink.model import Controller
 from robolink.transaction import Undone, UndoPlan
 from robolink.transaction import undo as take_back
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on, note, say, show_requests
 from robolink_cli.options.consent import DryRun, ThenSelect, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
@@ -76,7 +77,7 @@ def _agree(*, yes: bool) -> None:
     Raises:
         DeclinedError: The answer was no, or nobody could be asked.
     """
-    if not yes and (json_is_on() or not on_terminal()):
+    if not yes and (json_is_on() or not person_here()):
         raise DeclinedError(
             tr("An undo writes to the controller, but there is nobody to ask."),
             remedy=tr("Nothing was written. Look at it with --dry-run, then add --yes."),

@@ -10,7 +10,7 @@ from typing import Annotated, Final
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.output import is_terminal
+from robolink_cli.console.person import is_terminal
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.console.tables import filled, has_wide, within
 from robolink_cli.options.declaration import CliArgument, CliOption

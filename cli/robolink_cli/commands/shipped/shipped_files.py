@@ -22,6 +22,11 @@ def recipes_folder() -> Path:
     return _folder("recipes", "examples/recipes")
 
 
+def maps_folder() -> Path:
+    """Return the folder of the register maps to start from."""
+    return _folder("examples/plc-maps", "examples/plc-maps")
+
+
 def recipe_schema() -> Path:
     """Return the JSON Schema of a recipe, for editors."""
     return pages_folder() / "recipe.schema.json"

@@ -22,12 +22,12 @@ from prompt_toolkit.output import Output, create_output
 from robolink.interrupts import EndedBy, ended_by
 from robolink_cli.console.output import visible
 from robolink_cli.prompts.lines import open_lines
+from robolink_cli.wizard.ending import ended_of
 from robolink_cli.wizard.faces.arrivals import TimedKeys, TimedPress, timed
 from robolink_cli.wizard.faces.lines import LineFace, carry_out, leaves
 from robolink_cli.wizard.flow import advance, armed_anew, stops_at_once
 from robolink_cli.wizard.happenings import Happening, HasEnded, KeyPressed, TooFast
 from robolink_cli.wizard.keys import CountedKey, KeyGate, name_of
-from robolink_cli.wizard.screens.end import ended_of
 from robolink_cli.wizard.screens.layout import HEIGHT, WIDTH
 from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.state import WizardState

@@ -11,6 +11,7 @@ from robolink.messages import tr
 from robolink.runner import Question
 from robolink_cli.console.output import draw, sentences, terminal_width
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
+from robolink_cli.wizard.ending import ended_of
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import (
     Effect,
@@ -24,7 +25,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.screens.end import ended_of, told_end
+from robolink_cli.wizard.screens.end import told_end
 from robolink_cli.wizard.screens.layout import WIDTH
 from robolink_cli.wizard.screens.sentences import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState

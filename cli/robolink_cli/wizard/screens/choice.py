@@ -2,104 +2,58 @@
 
 from typing import Final
 
-from robolink.locale.languages import ENGLISH
 from robolink.messages import tr
 from robolink_cli.console.tables import padded
-from robolink_cli.wizard.screens.layout import BODY, JobStep, Screen, broken, status_row, title_row
-from robolink_cli.wizard.state import CheckPoint, CheckSubject, ChoiceSubject, Mark, WizardState
+from robolink_cli.wizard.screens.layout import BODY, Screen, broken, keys_of, status_row, title_row
+from robolink_cli.wizard.views.records import CheckRow, CheckView, ChoiceView, View
 
 _LEAST_SHOWN: Final = 3
 """Fewest options on the screen, however long the text above them."""
 
 
-def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> Screen:
+def choice_screen(view: View, body: ChoiceView) -> Screen:
     """Return the screen of a list; if it is too long, the part around the mark."""
-    assert state.question is not None  # noqa: S101 - checked by the caller
-    above = [row for line in subject.above for row in broken(line)]
-    most = BODY - 2 - min(_LEAST_SHOWN, len(subject.options))
+    above = [row for line in body.above for row in broken(line)]
+    most = BODY - 2 - min(_LEAST_SHOWN, len(body.rows))
     if len(above) > most:
         # The options must be visible.
         above = [*above[: most - 1], "..."]
-    told = [row for line in _details(state, subject) for row in broken(line)]
+    details = () if body.marked is None else body.rows[body.marked].details
+    told = [row for line in details for row in broken(line)]
     room = max(_LEAST_SHOWN, BODY - len(above) - 2 - (len(told) + 1 if told else 0))
-    first = max(0, min((state.marked or 0) - room // 2, len(subject.options) - room))
+    first = max(0, min((body.marked or 0) - room // 2, len(body.rows) - room))
     rows = []
-    for index, option in enumerate(subject.options[first : first + room], start=first):
-        sign = ">" if index == state.marked else " "
-        rows.append(f"{sign} {option}")
-    keys = (
-        ("5", subject.does or tr("Next")),
-        (tr("arrows"), tr("choose")),
-        *((("F2", language_label(subject.other)),) if subject.other else ()),
-        ("0", subject.leaves or tr("Leave")),
-    )
+    for index, option in enumerate(body.rows[first : first + room], start=first):
+        sign = ">" if index == body.marked else " "
+        rows.append(f"{sign} {option.text}")
     return Screen(
-        # A choice after the write belongs to the turn test.
-        title_row(state, subject.step, JobStep.TURN_TEST if state.accepted else JobStep.CHOOSE),
-        (*above, "", state.question.text, *rows, *(["", *told] if told else ())),
-        keys,
-        status=status_row(state, now_s) if state.reading is not None else "",
-        message=state.message,
+        title_row(view.head),
+        (*above, "", body.question, *rows, *(["", *told] if told else ())),
+        (("5", body.does), (tr("arrows"), tr("choose")), *keys_of(view)),
+        status=status_row(view.status) if view.status is not None else "",
+        message=view.message,
     )
 
 
-def language_label(language: str) -> str:
-    """Return a language's label beside the key that changes to it.
-
-    Args:
-        language: One of :data:`robolink.locale.languages.LANGUAGES`.
-    """
-    return tr("English") if language == ENGLISH else tr("Chinese")
-
-
-def _details(state: WizardState, subject: ChoiceSubject) -> tuple[str, ...]:
-    """Return the details of the marked option."""
-    if state.marked is None or not subject.details:
-        return ()
-    return subject.details[state.marked]
-
-
-def check_screen(state: WizardState, subject: CheckSubject, now_s: float) -> Screen:
+def check_screen(view: View, body: CheckView) -> Screen:
     """Return the screen of the check list."""
-    left = len(subject.open_rows(state.checked))
-    start = tr("Start moving ({n} open)", n=left) if left else tr("Start moving")
-    rows, marked = subject.rows, state.marked
+    rows, marked = [row for row in body.rows if row.name], body.marked
+    start, *leave = view.actions
     here = rows[marked] if marked is not None and marked < len(rows) else None
-    listed = [
-        row
-        for point in subject.points
-        for row in point_rows(point, state.checked, marked=point is here)
-    ]
-    listed.append(f"{'>' if marked == len(rows) else ' '}{' ' * 7}{start}")
+    listed = [line for row in body.rows for line in point_rows(row, marked=row is here)]
+    listed.append(f"{'>' if marked == len(rows) else ' '}{' ' * 7}{start.label}")
+    main = () if marked is None else (("5", start.label if here is None else here.does),)
     return Screen(
-        title_row(state, tr("Check"), JobStep.CHECK),
-        (*listed, "", *broken(subject.plan), tr("Keep a hand near the emergency stop.")),
-        (*_main(state, here, start), (tr("arrows"), tr("choose")), ("0", tr("Leave"))),
-        status=status_row(state, now_s),
-        message=state.message,
+        title_row(view.head),
+        (*listed, "", *broken(body.plan), tr("Keep a hand near the emergency stop.")),
+        (*main, (tr("arrows"), tr("choose")), *((one.key, one.label) for one in leave)),
+        status=status_row(view.status),
+        message=view.message,
     )
 
 
-def _main(state: WizardState, here: CheckPoint | None, start: str) -> tuple[tuple[str, str], ...]:
-    """Return what the main key does on the marked row; nothing without one."""
-    if state.marked is None:
-        return ()
-    if here is None:
-        return (("5", start),)
-    return (("5", tr("Take it back") if here.name in state.checked else here.does),)
-
-
-def mark_of(point: CheckPoint, checked: frozenset[str]) -> str:
-    """Return the word for the state of a point."""
-    if point.mark is Mark.OK or point.name in checked:
-        return tr("OK")
-    if point.mark is Mark.LOOK:
-        return tr("LOOK")
-    return tr("TO DO") if point.mark is Mark.TO_DO else tr("YOU")
-
-
-def point_rows(point: CheckPoint, checked: frozenset[str], *, marked: bool) -> list[str]:
+def point_rows(row: CheckRow, *, marked: bool) -> list[str]:
     """Return a point, broken to two rows where it is long."""
-    first, *rest = broken(point.text, 71)
-    row = f"{'>' if marked else ' '}{padded(mark_of(point, checked), 7)}{first}"
-    return [row, *(f"         {more}" for more in rest)]
+    first, *rest = broken(row.text, 71)
+    line = f"{'>' if marked else ' '}{padded(row.word, 7)}{first}"
+    return [line, *(f"         {more}" for more in rest)]

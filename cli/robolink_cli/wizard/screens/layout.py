@@ -2,15 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Final
 
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
-from robolink_cli.console.shell_words import state_word
 from robolink_cli.console.tables import SCREEN, columns, cut, filled, pieces
-from robolink_cli.wizard.happenings import Reading
-from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.views.records import Head, Status, View
 
 WIDTH: Final = SCREEN
 HEIGHT: Final = 24
@@ -61,6 +57,23 @@ class Screen:
         ]
 
 
+@dataclass(frozen=True, slots=True)
+class TerminalDraft:
+    """What stands on a terminal alone: its marked row, what is typed there, the part that is shown.
+
+    Attributes:
+        marked: Index of the marked row; ``None`` for none.
+        typed: What stands in the field.
+        typing: Whether the field of a pose is open at a touch.
+        page: Which part of a longer screen is shown, from 0.
+    """
+
+    marked: int | None = None
+    typed: str = ""
+    typing: bool = False
+    page: int = 0
+
+
 def key_rows(actions: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Yield the rows of keys, spread over the width; a second row where one is too narrow."""
     shown = [f"[{key}] {does}" for key, does in actions]
@@ -93,76 +106,40 @@ def row_of(values: Sequence[str], width: int = 11) -> str:
     return "".join(" " * max(0, width - columns(value)) + value for value in values)
 
 
-class JobStep(IntEnum):
-    """The steps of a change, as they are numbered."""
-
-    CHOOSE = 1
-    CHECK = 2
-    ON_THE_WAY = 3
-    TOUCH = 4
-    FIT = 5
-    VALUES = 6
-    TURN_TEST = 7
-
-
-def title_row(state: WizardState, name: str, step: JobStep | None = None) -> tuple[str, str]:
+def title_row(head: Head) -> tuple[str, str]:
     """Return the first row: cell and job at the left, the step at the right.
 
-    Args:
-        state: The state.
-        name: What the screen is called.
-        step: Which step it belongs to, ``None`` for none; its number is left out where the job's
-            steps have none, and where it would cut off something else.
+    The number of the step is left out where it would cut off something else.
     """
-    header = state.header
-    left, simulated = f"{header.cell}   {header.job}", ""
-    if header.simulated:
+    left, name, simulated = f"{head.cell}   {head.job}", head.title, ""
+    if head.simulated:
         simulated = "  " + tr("SIMULATED")
-    if step is not None and header.steps:
-        numbered = tr("{k} of {n}  {step}", k=min(step, header.steps), n=header.steps, step=name)
+    if head.step is not None:
+        number, count = head.step
+        numbered = tr("{k} of {n}  {step}", k=number, n=count, step=name)
         if columns(left) + 3 + columns(numbered + simulated) <= WIDTH:
             name = numbered
     return left, f"{name}{simulated}"
 
 
-def status_row(state: WizardState, now_s: float) -> str:
+def status_row(status: Status | None) -> str:
     """Return the second row: the state of the machine, and the age of the reading."""
-    reading = state.reading
-    if reading is None:
+    if status is None:
         return tr("No reading from the controller yet.")
-    tool = ""
-    if reading.pose is not None and reading.pose.tool is not None:
-        tool = "   " + tr("tool {n} selected", n=reading.pose.tool)
-    age = tr("reading {s} s", s=f"{max(0.0, now_s - reading.at_s):.1f}")
-    known = "".join(f"   {word}" for word in _switched(reading))
-    return f"{state_word(reading.state).upper()}{known}{tool}   {age}"
+    tool = "" if status.tool is None else "   " + tr("tool {n} selected", n=status.tool)
+    age = tr("reading {s} s", s=f"{status.age_s:.1f}")
+    known = "".join(f"   {word}" for word in _switched(status))
+    return f"{status.state.upper()}{known}{tool}   {age}"
 
 
-def _switched(reading: Reading) -> Iterator[str]:
+def _switched(status: Status) -> Iterator[str]:
     """Yield what was read of motors and power, and nothing else."""
-    if reading.motors is not None:
-        yield tr("motors on") if reading.motors else tr("motors OFF")
-    if reading.low_power is not None:
-        yield tr("power LOW") if reading.low_power else tr("power HIGH")
+    if status.motors is not None:
+        yield tr("motors on") if status.motors else tr("motors OFF")
+    if status.low_power is not None:
+        yield tr("power LOW") if status.low_power else tr("power HIGH")
 
 
-UPRIGHT: Final = ("X", "Y", "Z", "U")
-_TILTED: Final = (*UPRIGHT, "V", "W")
-_TILTS_DEG: Final = 0.005
-"""Smallest angle in degrees that is not 0 in the two decimals shown."""
-
-
-def coordinate_names(*shown: Pose | ToolOffset) -> tuple[str, ...]:
-    """Return the coordinates of a table: V and W only if one of its rows tilts."""
-    tilts = any(abs(angle) >= _TILTS_DEG for one in shown for angle in (one.v_deg, one.w_deg))
-    return _TILTED if tilts else UPRIGHT
-
-
-def mm(value: float) -> str:
-    """Return a length with three decimals, no negative zero."""
-    return f"{round(value, 3) + 0.0:.3f}"
-
-
-def signed(value: float, digits: int = 3) -> str:
-    """Return a difference with its sign."""
-    return f"{round(value, digits) + 0.0:+.{digits}f}"
+def keys_of(view: View) -> tuple[tuple[str, str], ...]:
+    """Return the keys of what can be pressed."""
+    return tuple((one.key, one.label) for one in view.actions)

@@ -1,18 +1,37 @@
-"""Which screen a state shows."""
+"""Which screen a state shows: the drawing of its view."""
 
 from dataclasses import replace
 
-from robolink.calibration_run import WriteSubject
 from robolink.messages import tr
-from robolink.runner import FitSubject, Question
 from robolink_cli.wizard.screens.choice import check_screen, choice_screen
-from robolink_cli.wizard.screens.end import ended_screen
+from robolink_cli.wizard.screens.end import end_screen
 from robolink_cli.wizard.screens.fit import fit_screen
-from robolink_cli.wizard.screens.layout import BODY, Screen, broken, status_row, title_row
-from robolink_cli.wizard.screens.move import moving_screen
+from robolink_cli.wizard.screens.layout import (
+    BODY,
+    Screen,
+    TerminalDraft,
+    broken,
+    keys_of,
+    status_row,
+    title_row,
+)
+from robolink_cli.wizard.screens.move import moving_screen, wait_screen
 from robolink_cli.wizard.screens.touch import touch_screen
 from robolink_cli.wizard.screens.values import values_screen
-from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, WizardState
+from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.views.records import (
+    CheckView,
+    ChoiceView,
+    EndView,
+    FitView,
+    MovingView,
+    QuestionView,
+    TouchView,
+    ValuesView,
+    View,
+    WaitView,
+)
+from robolink_cli.wizard.views.view import view_of
 
 
 def screen_of(state: WizardState, now_s: float) -> Screen:
@@ -22,61 +41,72 @@ def screen_of(state: WizardState, now_s: float) -> Screen:
         state: The state.
         now_s: The time, by the clock of its readings.
     """
-    subject, question = state.subject, state.question
-    if state.ended is not None:
-        return ended_screen(state, state.ended)
-    if question is None:
-        return moving_screen(state, now_s)
-    if state.at_place:
-        return _with_heard(state, touch_screen(state, now_s))
-    if isinstance(subject, ChoiceSubject):
-        return _with_heard(state, choice_screen(state, subject, now_s))
-    if question.kind is Question.YES_NO:
-        match subject:
-            case WriteSubject():
-                return values_screen(state, subject)
-            case CheckSubject():
-                return _with_heard(state, check_screen(state, subject, now_s))
-            case FitSubject():
-                return fit_screen(state, subject)
-            case _:
-                pass
-    return _question_screen(state, now_s)
+    return drawn(
+        view_of(state, now_s), TerminalDraft(state.marked, state.typed, state.typing, state.page)
+    )
 
 
-def _with_heard(state: WizardState, screen: Screen) -> Screen:
+def drawn(view: View, draft: TerminalDraft) -> Screen:
+    """Return the drawing of a view.
+
+    Args:
+        view: What is shown.
+        draft: What stands on the terminal besides.
+    """
+    match view.body:
+        case EndView() as body:
+            return end_screen(view, body)
+        case MovingView() as body:
+            return moving_screen(view, body)
+        case WaitView() as body:
+            return wait_screen(view, body)
+        case TouchView() as body:
+            return _with_heard(view, touch_screen(view, body, draft))
+        case ChoiceView() as body:
+            return _with_heard(view, choice_screen(view, body))
+        case CheckView() as body:
+            return _with_heard(view, check_screen(view, body))
+        case ValuesView() as body:
+            return values_screen(view, body, draft)
+        case FitView() as body:
+            return fit_screen(view, body)
+        case QuestionView() as body:
+            return _question_screen(view, body, draft)
+
+
+def _with_heard(view: View, screen: Screen) -> Screen:
     """Return a screen with the earlier messages, as many as fit, the last first.
 
     The work says it between two questions, when there is no screen that anybody could read.
     """
-    rows = [row for remark in state.heard for row in broken(remark) if row.strip()]
+    rows = [row for remark in view.heard for row in broken(remark) if row.strip()]
     room = screen.room() - 1
     if not rows or room < 1:
         return screen
     return replace(screen, lines=(*screen.lines, "", *rows[-room:]))
 
 
-def _question_screen(state: WizardState, now_s: float) -> Screen:
+def _question_screen(view: View, body: QuestionView, draft: TerminalDraft) -> Screen:
     """Return the screen of a question that has none of its own."""
-    assert state.question is not None  # noqa: S101 - checked by the caller
-    asked = ["", *broken(state.question.text), ""]
+    asked = ["", *broken(body.question), ""]
     keys: tuple[tuple[str, str], ...]
-    if state.question.kind is Question.TEXT:
-        asked.append(f"> {state.typed}_")
-        keys = (("Enter", tr("Done")), ("Esc", tr("STOP")))
+    if body.text:
+        asked.append(f"> {draft.typed}_")
+        keys = keys_of(view)
     else:
+        *answers, leave = view.actions
         asked += [
-            f"{'>' if index == state.marked else ' '} {answer}"
-            for index, answer in enumerate((tr("Yes"), tr("No")))
+            f"{'>' if index == draft.marked else ' '} {answer.label}"
+            for index, answer in enumerate(answers)
         ]
-        keys = (("5", tr("Do it")), (tr("arrows"), tr("choose")), ("0", tr("STOP")))
+        keys = (("5", tr("Do it")), (tr("arrows"), tr("choose")), (leave.key, leave.label))
     # The message before a question often gives the reason for it.
-    before = [row for remark in state.remarks[-6:] for row in broken(remark)]
+    before = [row for remark in body.told for row in broken(remark)]
     room = max(0, BODY - len(asked) - 1)
     return Screen(
-        title_row(state, tr("Question")),
+        title_row(view.head),
         (*before[-room:], *asked),
         keys,
-        status=status_row(state, now_s),
-        message=state.message if state.message not in before else "",
+        status=status_row(view.status),
+        message=view.message if view.message not in before else "",
     )

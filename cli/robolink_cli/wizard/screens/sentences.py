@@ -7,12 +7,14 @@ from robolink.locale.languages import ENGLISH
 from robolink.messages import joined, tr
 from robolink.model import describe_pose
 from robolink.runner import FitSubject, Question, TouchSubject
-from robolink_cli.wizard.screens.choice import language_label, mark_of
 from robolink_cli.wizard.screens.fit import fit_lines
-from robolink_cli.wizard.screens.layout import WIDTH, mm
-from robolink_cli.wizard.screens.touch import angle_word, instruction, touch_title
-from robolink_cli.wizard.screens.values import taught_lines
+from robolink_cli.wizard.screens.layout import WIDTH, broken
 from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, WizardState
+from robolink_cli.wizard.views.fit import fit_view
+from robolink_cli.wizard.views.frame import mm
+from robolink_cli.wizard.views.lists import check_rows, language_label
+from robolink_cli.wizard.views.place import angle_word, instruction, touch_title
+from robolink_cli.wizard.views.values import taught_lines
 
 
 def told_before(state: WizardState, width: int = WIDTH) -> list[str]:
@@ -24,7 +26,7 @@ def told_before(state: WizardState, width: int = WIDTH) -> list[str]:
     """
     match state.subject:
         case FitSubject() as fit:
-            return fit_lines(fit, width)
+            return fit_lines(fit_view(fit), width)
         case ChoiceSubject() as subject:
             rows = []
             for index, option in enumerate(subject.options):
@@ -34,14 +36,15 @@ def told_before(state: WizardState, width: int = WIDTH) -> list[str]:
             return [*subject.above, *rows]
         case CheckSubject() as subject:
             numbers = {point.name: n for n, point in enumerate(subject.rows, start=1)}
+            words = (row.word for row in check_rows(state, subject))
             points = [
-                f"  {mark_of(point, state.checked)}: {point.text}"
+                f"  {word}: {point.text}"
                 + (f"  [{numbers[point.name]}] {point.does}" if point.name else "")
-                for point in subject.points
+                for word, point in zip(words, subject.points, strict=True)
             ]
             return [*points, subject.plan, tr("Keep a hand near the emergency stop.")]
         case WriteSubject() as subject:
-            return [line for line in taught_lines(state, subject) if line]
+            return [row for line in taught_lines(state, subject) for row in broken(line)]
         case _:
             return []
 

@@ -25,12 +25,13 @@ from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.live import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
+from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on, note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import terminal
-from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.prompts.questions import agree
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.order import ordered, show_done, with_order
 from robolink_cli.views.fit import judged_payload, report_payload
@@ -181,7 +182,7 @@ def _carry_out(
     describe: DescribeReport,
 ) -> ChangeReport:
     one = frame.tool_plan(given, controller, verify=False)
-    attended = not frame.yes and on_terminal()
+    attended = not frame.yes and bool(person_here())
     change = NozzleChange(
         controller,
         ChangePlan((one,), ask_before_write=False, attended=attended, agreed_by=None),
@@ -248,7 +249,7 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
         "tool {tool} anyway? 'robolink undo' undoes it.",
         tool=tool,
     )
-    if not yes and not on_terminal():
+    if not yes and not person_here():
         raise DeclinedError(
             tr("This writes tool {tool}, but there is nobody to ask.", tool=tool),
             remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),

@@ -1,0 +1,1 @@
+"""The panel: pages for a tablet at the cell."""

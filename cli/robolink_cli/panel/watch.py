@@ -1,0 +1,271 @@
+"""Looks at cells on which no job runs: seldom, and only where somebody wants it.
+
+An EPSON controller serves one client. A panel that polled it would keep others out by chance, so a
+look is made when a page of the cell is opened, or every ``watch_s`` of its cell file. It is
+``robolink status``: a process of its own that connects, reads, and closes; what that may read while
+production runs, docs/monitor-only.md says. Where somebody has the controller, it is not asked: who
+has it tells what was seen last.
+"""
+
+import asyncio
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Final
+
+from robolink.errors import RobolinkError
+from robolink.locale.languages import ENGLISH
+from robolink.messages import declared, spoken, tr
+from robolink.timing import local_label, wall_label
+from robolink_cli.console.language import VARIABLE
+from robolink_cli.console.shell_words import state_word
+from robolink_cli.panel.cards import CellCard
+
+if TYPE_CHECKING:
+    from robolink.model import Marker
+    from robolink.stopping import StopNote
+
+LEAST_APART_S: Final = 5.0
+"""Shortest time in s between two looks at a cell that a page asked for."""
+
+STALE_AFTER_S: Final = 10.0
+"""Age in s from which a reading says how the cell was, and no longer how it is."""
+
+NO_ANSWER: Final = declared("The cell did not answer.")
+
+_LONGEST_S: Final = 20.0
+"""Longest wait in s for the end of a look."""
+
+AT_ONCE: Final = 2
+"""Number of looks at the same time: each is a process."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What a look showed.
+
+    Attributes:
+        at_s: When, monotonic.
+        at: When, as a label.
+        read: The document of ``robolink status``; empty where it ended in an error.
+        failed: Why nothing was read; empty where something was.
+    """
+
+    at_s: float
+    at: str
+    read: dict[str, Any] = field(default_factory=dict)
+    failed: str = ""
+
+    @property
+    def state(self) -> str:
+        """The controller's state; empty where nobody knows it."""
+        return str(self.read.get("state") or "")
+
+    @property
+    def taken_s(self) -> float:
+        """When the controller was read, monotonic: by another process it was read before."""
+        age = self.read.get("age_s")
+        return self.at_s - (float(age) if isinstance(age, (int, float)) else 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What is on record of a cell, whatever the controller says.
+
+    Attributes:
+        interrupted: Jobs that are open; no other begins before they are settled.
+        stopped: Who stopped it; ``None`` where nobody did, or it was released.
+    """
+
+    interrupted: "tuple[Marker, ...]" = ()
+    stopped: "StopNote | None" = None
+
+    def lines(self) -> tuple[str, ...]:
+        """Return it in sentences, in the language that is spoken."""
+        from robolink.model import begun_in_words
+
+        told = [
+            tr(
+                "Not finished since {when}: {request}.",
+                when=local_label(marker.begun_at),
+                request=begun_in_words(marker),
+            )
+            for marker in self.interrupted
+        ]
+        return (*told, *((self.stopped.sentence,) if self.stopped else ()))
+
+
+def standing_of(url: str) -> Standing:
+    """Return what journal and notes say of a cell; sends nothing.
+
+    What cannot be read is left out: the next job, which needs it, says why.
+    """
+    from robolink.journal import default_location, may_exist, open_journal
+    from robolink.stopping import find_note
+    from robolink.transport import far_end_of, parse_url
+    from robolink_cli.stopping.notes import last_known
+
+    interrupted: tuple[Marker, ...] = ()
+    stopped = None
+    with suppress(RobolinkError, OSError):
+        if may_exist(default_location()):
+            log = open_journal(read_only=True).log(parse_url(url).address)
+            interrupted = log.open_markers()
+    with suppress(RobolinkError, OSError):
+        stopped = find_note(far_end_of(url), last_known(url))
+    return Standing(interrupted, stopped)
+
+
+class CellWatch:
+    """Looks at one cell.
+
+    Args:
+        cell: Its name.
+        url: Its controller.
+        every_s: How often it is looked at; ``None`` for only when a page is opened.
+        changed: Called when there is something new to show.
+        slots: Taken for a look, of all cells together.
+
+    Attributes:
+        look: What was seen last; ``None`` before the first look.
+        looking: Whether a look is under way.
+    """
+
+    def __init__(
+        self,
+        cell: str,
+        url: str,
+        every_s: float | None,
+        changed: Callable[[], None],
+        slots: asyncio.Semaphore,
+    ) -> None:
+        self.cell, self.url, self.every_s = cell, url, every_s
+        self._slots = slots
+        self._changed = changed
+        self.look: Look | None = None
+        self.looking = False
+
+    def is_due(self, now_s: float, *, wanted: bool) -> bool:
+        """Return whether to look now.
+
+        Args:
+            now_s: The time, monotonic.
+            wanted: Whether a page of the cell was just opened.
+        """
+        if self.looking:
+            return False
+        if self.look is None:
+            return wanted or self.every_s is not None
+        apart_s = LEAST_APART_S if wanted else self.every_s
+        return apart_s is not None and now_s - self.look.at_s >= apart_s
+
+    async def take(self) -> None:
+        """Look."""
+        if self.looking:
+            return
+        self.looking = True
+        try:
+            async with self._slots:
+                self.look = await _looked(self.cell)
+        finally:
+            self.looking = False
+        self._changed()
+
+
+async def _looked(cell: str) -> Look:
+    try:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            *("-m", "robolink_cli", "--json", "-c", cell, "status"),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+            env={**os.environ, VARIABLE: ENGLISH},
+            start_new_session=os.name != "nt",
+        )
+        try:
+            out, _ = await asyncio.wait_for(process.communicate(), _LONGEST_S)
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+            return Look(time.monotonic(), wall_label(), failed=NO_ANSWER)
+        said = json.loads(out)
+    except (OSError, ValueError) as error:
+        return Look(time.monotonic(), wall_label(), failed=str(error) or type(error).__name__)
+    now_s, at = time.monotonic(), wall_label()
+    if "error" in said:
+        return Look(now_s, at, failed=str(said["error"].get("what", "")) or NO_ANSWER)
+    return Look(now_s, at, read=said)
+
+
+def card_of(
+    watch: CellWatch,
+    standing: Standing,
+    now_s: float,
+    *,
+    simulated: bool,
+    said: tuple[str, ...] = (),
+) -> CellCard:
+    """Return the card of a cell on which no job runs, in the language that is spoken.
+
+    Args:
+        watch: What was seen of it.
+        standing: What is on record of it.
+        now_s: The time, monotonic.
+        simulated: Whether nothing real moves.
+        said: What the last job left to be read.
+    """
+    look = watch.look
+    card = CellCard(watch.cell, "unknown", tr("not looked at"), simulated=simulated)
+    if look is None:
+        told = tr("Looking ...") if watch.looking else tr("Open the cell to look at it.")
+        card = replace(card, lines=(told,))
+    elif look.failed:
+        card = replace(card, word=tr("no answer"), lines=(spoken(look.failed), _when(look)))
+    else:
+        card = replace(
+            card,
+            mark=_mark(look) if now_s - look.taken_s < STALE_AFTER_S else "unknown",
+            word=state_word(look.state) if look.state else tr("not read"),
+            lines=_read(look, now_s),
+            simulated=simulated or look.read.get("simulated") is True,
+        )
+    lines = standing.lines()
+    if lines:
+        # What is open counts however the controller stands.
+        card = replace(card, mark="look" if card.mark == "ok" else card.mark)
+    return replace(card, lines=(*lines, *said, *card.lines))
+
+
+def _mark(look: Look) -> str:
+    read = look.read
+    if any(read.get(flag) for flag in ("emergency_stop", "guard_open", "fault", "serious_fault")):
+        return "bad"
+    if read.get("held_by") or read.get("running") or read.get("warning") or look.state != "ready":
+        return "look"
+    return "ok"
+
+
+def _read(look: Look, now_s: float) -> tuple[str, ...]:
+    read, lines = look.read, list[str]()
+    if read.get("held_by"):
+        lines.append(tr("In use: {who}.", who=read["held_by"]))
+    if isinstance(read.get("selected_tool"), int):
+        lines.append(tr("tool {number}", number=read["selected_tool"]))
+    if read.get("text"):
+        lines.append(str(read["text"]))
+    if now_s - look.taken_s >= STALE_AFTER_S:
+        lines.append(tr("This is how it was at {time}.", time=_clock(look)))
+    return tuple(lines)
+
+
+def _when(look: Look) -> str:
+    return tr("Last look: {time}.", time=_clock(look))
+
+
+def _clock(look: Look) -> str:
+    return local_label(look.at)

@@ -1,0 +1,328 @@
+"""The hub: the last snapshot for every tablet, and no tablet that holds up another."""
+
+import asyncio
+import time
+from types import SimpleNamespace
+
+import pytest
+from robolink_cli.panel import hub as hub_module
+from robolink_cli.panel.hub import BEAT_S, Hub, LivePage, PanelCell, may_begin
+from robolink_cli.panel.jobs import KINDS, JobEnd
+from robolink_cli.panel.pages import Pages, Parts, Watcher
+from robolink_cli.panel.watch import CellWatch, Look, Standing, card_of
+from robolink_cli.wizard.views.records import Head, QuestionView, Status, View
+
+from robolink.model import Marker, MarkerKind
+
+CELL = PanelCell("line3", "epson+tcp://192.0.2.1:5000")
+
+
+class FewPages(Pages):
+    """Draws a view as its question, and counts."""
+
+    def __init__(self):
+        self.drawn = 0
+
+    def screen(self, view, watcher):
+        self.drawn += 1
+        return Parts("question", view.head.title, view.body.question, watcher.language)
+
+    def idle(self, card, watcher):
+        self.drawn += 1
+        return Parts("idle", card.name, card.word, watcher.language)
+
+    def overview(self, cards, watcher):
+        self.drawn += 1
+        return Parts("overview", "", " ".join(card.word for card in cards), watcher.language)
+
+
+class NoSeats:
+    def __init__(self, tablet=""):
+        self.tablet = tablet
+
+    def holder(self, cell, *, moving=None):
+        return SimpleNamespace(tablet=self.tablet, who="mei") if self.tablet else None
+
+
+class FakeJob:
+    kind = KINDS["change"]
+    language = "en"
+
+    def __init__(self):
+        self.view, self.view_s, self.end = None, time.monotonic(), None
+        self.alives = 0
+
+    def alive(self):
+        self.alives += 1
+
+    async def wait(self):
+        return None
+
+
+def view(number, question="?", age_s=0.1):
+    status = Status("ready", halted=False, age_s=age_s)
+    body = QuestionView((), question, text=False)
+    return View(
+        number, waits=True, head=Head("line3", "change", "Ready?"), status=status, body=body
+    )
+
+
+@pytest.fixture
+def noted():
+    return []
+
+
+@pytest.fixture
+def hub(noted):
+    cells = [CELL, PanelCell("line4", "epson+tcp://192.0.2.2:5000")]
+    return Hub(cells, FewPages(), NoSeats("t1"), lambda *what, **facts: noted.append(what))
+
+
+class Tablet:
+    """A page that keeps what it is sent; it may be slow."""
+
+    def __init__(self, cell="line3", tablet="t1", language="en"):
+        self.frames = []
+        self.takes = asyncio.Event()
+        self.takes.set()
+        self.live = LivePage(self.send, lambda: Watcher(language), tablet, cell)
+
+    async def send(self, frame):
+        await self.takes.wait()
+        self.frames.append(frame)
+
+    def of(self, kind):
+        return [frame for frame in self.frames if frame["t"] == kind]
+
+
+def watched(hub, *tablets, then):
+    async def work():
+        shows = [asyncio.ensure_future(hub.show(one.live)) for one in tablets]
+        try:
+            return await then()
+        finally:
+            for one in shows:
+                one.cancel()
+            await asyncio.gather(*shows, return_exceptions=True)
+
+    return work()
+
+
+def change(hub, shown):
+    board = hub.boards["line3"]
+    board.job.view, board.job.view_s = shown, time.monotonic()
+    board.renew()
+
+
+def test_a_slow_tablet_gets_the_last_snapshot_only_and_holds_up_nobody(hub):
+    async def work():
+        slow, quick = Tablet(), Tablet(tablet="t2")
+
+        async def then():
+            await asyncio.sleep(0.02)
+            slow.takes.clear()
+            for number in range(1, 51):
+                change(hub, view(number, f"question {number}"))
+                await asyncio.sleep(0.005)
+            slow.takes.set()
+            await asyncio.sleep(0.05)
+            return slow, quick
+
+        hub.boards["line3"].job = FakeJob()
+        hub.boards["line3"].job.view = view(0, "before")
+        return await watched(hub, slow, quick, then=then)
+
+    slow, quick = asyncio.run(work())
+    base = hub.boards["line3"].base
+    asked = [frame["parts"].get("main") for frame in slow.of("screen")]
+    assert len(asked) <= 4, asked
+    assert slow.of("screen")[-1]["number"] == base + 50
+    assert asked[-1] == "question 50"
+    assert len(quick.of("screen")) > 25
+
+
+def test_what_does_not_differ_is_not_sent_and_all_tablets_share_one_drawing(hub):
+    async def work():
+        tablets = [Tablet(tablet=f"t{number}") for number in range(20)]
+
+        async def then():
+            await asyncio.sleep(0.05)
+            for age_s in (0.2, 0.3):
+                change(hub, view(1, "same", age_s))
+                await asyncio.sleep(0.02)
+            return tablets
+
+        hub.boards["line3"].job = FakeJob()
+        hub.boards["line3"].job.view = view(1, "same")
+        return await watched(hub, *tablets, then=then)
+
+    tablets = asyncio.run(work())
+    assert all(len(one.of("screen")) == 1 for one in tablets)
+    assert hub.pages.drawn == 3
+
+
+def test_a_beat_comes_at_least_every_three_tenths_with_the_age_of_the_reading(hub):
+    async def work():
+        tablet = Tablet()
+
+        async def then():
+            await asyncio.sleep(4 * BEAT_S + 0.1)
+            return tablet.of("beat")
+
+        hub.boards["line3"].job = FakeJob()
+        hub.boards["line3"].job.view = view(1, age_s=0.5)
+        return await watched(hub, tablet, then=then)
+
+    beats = asyncio.run(work())
+    assert len(beats) >= 4
+    ages = [beat["age_ms"] for beat in beats]
+    assert ages == sorted(ages)
+    assert ages[0] >= 500
+    assert ages[-1] - ages[0] > 400, "an age that stands still shows what is stale as live"
+    assert beats[0]["status"]["state"] == "ready"
+
+
+def test_a_tablet_that_is_not_heard_any_more_is_let_go(hub, monkeypatch):
+    monkeypatch.setattr(hub_module, "GONE_S", 0.1)
+
+    async def work():
+        tablet = Tablet()
+        await asyncio.wait_for(hub.show(tablet.live), 5)
+        return hub.lives
+
+    assert asyncio.run(work()) == set()
+
+
+def test_a_job_hears_that_its_tablet_is_there_only_from_its_own_page(hub):
+    board = hub.boards["line3"]
+    board.job = job = FakeJob()
+    now_s = time.monotonic()
+    for cell, tablet, heard_s, alive in (
+        ("line3", "t2", now_s, False),
+        ("line4", "t1", now_s, False),
+        ("", "t1", now_s, False),
+        ("line3", "t1", now_s - 1.5, False),
+        ("line3", "t1", now_s, True),
+    ):
+        live = Tablet(cell, tablet).live
+        live.heard_s = heard_s
+        hub.lives = {live}
+        job.alives = 0
+        hub._tend(board, now_s)
+        assert bool(job.alives) == alive, (cell, tablet, heard_s)
+
+
+def test_numbers_of_one_job_are_none_of_another(hub):
+    board = hub.boards["line3"]
+    seen = set()
+    for _ in range(3):
+        board.next_numbers()
+        board.job = FakeJob()
+        for number in (0, 1, 2, 999_999):
+            board.job.view = view(number)
+            assert board.question() == number
+            assert board.number not in seen
+            seen.add(board.number)
+
+
+def test_a_job_that_ended_without_order_is_told_and_on_record(hub, noted, monkeypatch):
+    monkeypatch.setattr(hub_module, "standing_of", lambda _: Standing())
+
+    async def work():
+        board = hub.boards["line3"]
+        board.job = job = FakeJob()
+        job.end = JobEnd(None, (), "Traceback of a child")
+        before = board.number
+
+        await hub._until_end(board, job)
+        return board, before
+
+    board, before = asyncio.run(work())
+    assert board.job is None
+    assert board.number != before
+    assert "ended without saying how" in board.said[0]
+    assert "Traceback" not in "".join(board.said)
+    assert ("job_lost", "line3") in noted
+
+
+# The card of a cell on which no job runs.
+
+
+def watch(look=None):
+    found = CellWatch("line3", CELL.url, None, lambda: None, asyncio.Semaphore(1))
+    found.look = look
+    return found
+
+
+def card(look, age_s=0.0, standing=None):
+    return card_of(watch(look), standing or Standing(), look.at_s + age_s, simulated=False)
+
+
+READY = {"state": "ready", "selected_tool": 1}
+AT = "2026-11-30T03:00:00+00:00"
+
+
+def test_what_was_seen_is_never_shown_as_how_it_is_once_it_is_old():
+    look = Look(50.0, AT, READY)
+    assert card(look, 1).mark == "ok"
+    old = card(look, 11)
+    assert old.mark == "unknown"
+    assert "This is how it was at" in " ".join(old.lines)
+    by_another = Look(50.0, AT, {**READY, "held_by": "ann", "age_s": 30.0})
+    assert card(by_another, 1).mark == "unknown", "another process read it half a minute before"
+
+
+@pytest.mark.parametrize(
+    ("read", "mark"),
+    [
+        (READY, "ok"),
+        ({**READY, "held_by": "ann", "age_s": 0.1}, "look"),
+        ({**READY, "running": True, "state": "running"}, "look"),
+        ({**READY, "emergency_stop": True, "state": "emergency stop"}, "bad"),
+        ({**READY, "guard_open": True}, "bad"),
+        ({**READY, "state": "teach"}, "look"),
+    ],
+)
+def test_only_what_is_ready_and_free_is_called_so(read, mark):
+    assert card(Look(50.0, AT, read)).mark == mark
+
+
+def test_a_cell_that_does_not_answer_shows_no_old_values():
+    shown = card(Look(50.0, AT, failed="no route"))
+    assert shown.mark == "unknown"
+    assert shown.lines[0] == "no route"
+
+
+def test_an_open_job_counts_however_ready_the_controller_is(hub):
+    marker = Marker("a", MarkerKind.CHANGE, "change of tool 1", AT, {})
+    shown = card(Look(50.0, AT, READY), standing=Standing((marker,)))
+    assert shown.mark == "look"
+    board = hub.boards["line3"]
+    board.standing = Standing((marker,))
+    offers = {one.job: one for one in board.offers(Watcher(role="engineer"))}
+    assert offers["recover"].why_not == ""
+    assert offers["change"].why_not
+    board.standing = Standing()
+    assert "recover" not in {one.job for one in board.offers(Watcher())}
+
+
+def test_a_look_is_made_for_a_page_or_where_the_cell_file_asks_for_it():
+    never = watch()
+    assert not never.is_due(100.0, wanted=False)
+    assert never.is_due(100.0, wanted=True)
+    never.look = Look(100.0, AT, READY)
+    assert not never.is_due(10_000.0, wanted=False), "an idle cell was polled"
+    assert not never.is_due(101.0, wanted=True), "six tabs would poll it"
+    often = CellWatch("line3", CELL.url, 30.0, lambda: None, asyncio.Semaphore(1))
+    assert often.is_due(0.0, wanted=False)
+    often.look = Look(100.0, AT, READY)
+    assert not often.is_due(129.0, wanted=False)
+    assert often.is_due(130.0, wanted=False)
+
+
+def test_an_operator_begins_what_is_an_operators():
+    assert may_begin(KINDS["change"], "operator")
+    assert not may_begin(KINDS["undo"], "operator")
+    assert may_begin(KINDS["undo"], "engineer")
+    for nobody in ("", "onlooker"):
+        assert not any(may_begin(kind, nobody) for kind in KINDS.values())

@@ -1,0 +1,63 @@
+"""The history page: rows and charts come from the journal of changes that were really made."""
+
+import pytest
+from robolink_cli.panel.history import changes_of, charts_of, page_of
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.testkit.media import served
+
+from robolink.errors import ConfigError
+from robolink.journal import open_journal
+from robolink.model import EntryKind, NewEntry, Signature
+from tests._commands import run_command
+from tests.contract._shipped_cells import BEAMS_MM, EXAMPLES
+
+URL = "epson+tcp://192.168.0.9:5000"
+
+
+@pytest.fixture
+def changed(robolink_state):
+    """Change a nozzle twice in a cell with two beams; return its URL."""
+    simulator = EpsonSimulator(seed=3)
+    simulator.machine.motors_on = True
+    simulator.world.change_nozzle(2)
+    for number, heading_deg in ((3, 2.0), (4, 91.0)):
+        beam = LightBeam(BEAMS_MM, heading_deg, radius_mm=0.1)
+        simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
+    with served(simulator, "tcp", clock=ScaledClock(40)) as url:
+        for nozzle in ("N-1", "N-2"):
+            words = ("--nozzle", nozzle, "--lot", "L", "--yes")
+            done = run_command("-c", url, "change", str(EXAMPLES / "needle-beams.toml"), *words)
+            assert done.code == 0, done.err
+        yield url
+
+
+def test_two_changes_are_rows_charts_and_pages_of_this_cell(changed):
+    newest, first = changes_of(changed)
+    assert ("N-2" in newest.what, "N-1" in first.what) == (True, True)
+    assert (newest.mark, newest.report) == ("ok", True)
+    assert 0.0 < float(newest.tested) < 0.2
+    assert float(first.moved) > float(newest.moved)  # the second needle is the first one
+
+    assert newest.change in page_of(changed, newest.change)
+    with pytest.raises(ConfigError):
+        page_of(URL, newest.change)
+
+    cards = charts_of(changed)
+    assert {card.title for card in cards} >= {"X of tool 1", "Y of tool 1"}
+    assert all(card.picture.startswith("<svg") and not card.unusual for card in cards)
+    assert charts_of(changed, striking=True) == ()
+
+
+def test_without_a_journal_there_is_nothing(robolink_state):
+    assert (changes_of(URL), charts_of(URL)) == ((), ())
+
+
+def test_a_change_that_cannot_be_understood_is_a_row_without_a_page(robolink_state):
+    log = open_journal().log(URL, signature=Signature(operator="Chen", os_user="cell"))
+    log.append(
+        NewEntry(EntryKind.CALIBRATION, change="c" * 32, operation="o", tool=1, details={"x": 1})
+    )
+    (row,) = changes_of(URL)
+    assert (row.who, row.mark, row.report) == ("Chen", "bad", False)

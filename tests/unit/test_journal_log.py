@@ -260,7 +260,7 @@ def tamper(journal, statement):
         tables.connection.run(statement)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(APPENDS)
 def test_any_sequence_of_entries_verifies_and_comes_back_as_it_was_given(appends):
     journal = fresh()
@@ -278,7 +278,7 @@ def test_any_sequence_of_entries_verifies_and_comes_back_as_it_was_given(appends
     journal.close()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     number=st.integers(1, 5),
     column=st.sampled_from([name for name in COLUMNS if name != "number"]),

@@ -6,6 +6,7 @@ A client sends the same few lines with another place in each, or another number 
 reading a line takes a millisecond of the processor, filling it some microseconds.
 """
 
+import pickle
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
@@ -292,8 +293,15 @@ def _statement_word() -> re.Pattern[str]:
 
 
 def _program_line(text: str) -> tuple[LineNode, ...]:
-    nodes: tuple[LineNode, ...] = _parser().parse(text, start="program_line")  # type: ignore[assignment]
+    # What runs is known by its node, so lines with the same text have nodes of their own.
+    nodes: tuple[LineNode, ...] = pickle.loads(_kept_line(text))
     return nodes
+
+
+@lru_cache(maxsize=4096)
+def _kept_line(text: str) -> bytes:
+    """Return a line's statements in a form to copy; a cell in each test has the same program."""
+    return pickle.dumps(_parser().parse(text, start="program_line"))
 
 
 def _refusal(text: str, error: LarkError) -> SpelRefusal:

@@ -1,6 +1,7 @@
 """Options as they are declared, and every help page in 80 columns and in each language."""
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
@@ -10,6 +11,7 @@ from click.testing import CliRunner
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from robolink_cli import main
+from robolink_cli.console import language
 from robolink_cli.console.help_pages import WideHelpFormatter
 from robolink_cli.console.tables import columns
 from robolink_cli.options.declaration import CliArgument, CliOption, add_declared, declared_options
@@ -38,6 +40,8 @@ def pages(command=main.cli, path=()):
 def shown(request, monkeypatch, capsys):
     """Every page, by its path."""
     monkeypatch.setenv("COLUMNS", "80")
+    # A catalogue is read once, and not for each page.
+    monkeypatch.setattr(language, "translator", cache(language.translator))
     texts = {}
     try:
         for path in pages():

@@ -211,7 +211,9 @@ def test_a_login_that_was_ended_does_not_come_back_with_its_cookie(panel):
     assert browser.post("/logout").status == 200
     browser.jar = dict(kept)
     assert browser.post("/seat", {"cell": CELL}).status == 403
-    # Nor does an older one, when there is a newer.
+    # Nor does one that another has followed.
     browser.log_in()
+    kept = dict(browser.jar)
+    browser.log_in(JON)
     browser.jar = dict(kept)
     assert browser.post("/seat", {"cell": CELL}).status == 403

@@ -162,7 +162,8 @@ class ScriptedPanel:
 
     async def _tell(self, socket, news):
         await socket.send_json({"t": "hello", "server": self.server, "token": "T"})
-        shown, number = {}, None
+        shown: dict[str, str] = {}
+        number = None
         while socket.client_state is WebSocketState.CONNECTED:
             news.clear()
             if not self.frozen:

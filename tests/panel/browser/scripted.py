@@ -174,7 +174,10 @@ class ScriptedPanel:
                     await socket.send_json(
                         {"t": "screen", "screen": parts.screen, "number": number, "parts": changed}
                     )
-                await socket.send_json({"t": "beat", "age_ms": self.age_ms, "status": {}})
+                at_ms = round(1000 * time.monotonic())
+                await socket.send_json(
+                    {"t": "beat", "age_ms": self.age_ms, "status": {}, "at_ms": at_ms}
+                )
             try:
                 await asyncio.wait_for(news.wait(), 0.2)
             except TimeoutError:

@@ -524,6 +524,18 @@ def test_a_stop_is_not_said_for_ever(panel, page, fingers):
     assert len(still(panel, "stop", 1.0)) == count
 
 
+def test_who_presses_where_it_says_not_stopped_presses_stop(panel, page, fingers):
+    panel.answers = "failed"
+    fingers.tap("#stop")
+    page.wait_for_selector("#unstopped:visible")
+    fingers.tap("#unstopped .huge")
+    until(lambda: len({one["press"] for one in panel.of("stop")}) == 2)
+    assert page.is_visible("#unstopped")
+    fingers.tap("#unstopped [data-close]")
+    page.wait_for_selector("#unstopped", state="hidden")
+    assert len({one["press"] for one in panel.of("stop")}) == 2
+
+
 @pytest.mark.parametrize("outcome", ["failed", "old"])
 def test_a_stop_that_failed_is_not_called_stopped(panel, page, fingers, outcome):
     panel.answers = outcome

@@ -179,6 +179,22 @@ def test_a_cable_that_is_out_and_back(cell, wired, cable):
     person.jogs("z+", 0.1)
 
 
+def test_a_press_that_the_cable_held_back_does_nothing_when_it_is_back(cell, wired, cable):
+    """For the first second the page does not know that its cable is out."""
+    page = wired.new_page()
+    person = at_touch(page, cell)
+    at, before = person.fingers.middle('[data-action=jog][data-value^="z+"]'), cell.tip_mm()
+    cable.out = True
+    time.sleep(0.2)
+    person.fingers.tap(at)
+    assert page.locator("body.silent").count() == 0
+    time.sleep(4.0)
+    cable.out = False
+    alive(page)
+    time.sleep(2.0)
+    assert cell.tip_mm() == before
+
+
 def test_a_held_key_makes_one_step_at_most_after_the_cable_is_out(cell, wired, cable):
     page = wired.new_page()
     person = at_touch(page, cell)

@@ -43,9 +43,9 @@ def serve_robot() -> None:
 def run_panel(arguments: list[str]) -> None:
     """Run the panel, with the job of this module."""
     from robolink_cli.entry import run
-    from robolink_cli.panel.jobs import Job
+    from robolink_cli.panel.jobs import PanelJob
 
-    Job.program = "benchmarks.links.panel_ends"
+    PanelJob.program = "benchmarks.links.panel_ends"
     sys.exit(run(arguments))
 
 

@@ -192,6 +192,14 @@ def _set_as_stated(_state: Any, stated_mm_s2: float | None) -> Iterator[str]:
         yield f"AccelS {stated_mm_s2:.3f}, {stated_mm_s2:.3f}"
 
 
+def _taken_from_anybody(seats: Any, cell: str, tablet: Any, *, moving: object) -> Any:
+    from robolink_cli.panel.guard.seat import Holder, Taking, _Seat
+
+    mine = Holder(tablet.id, tablet.who, tablet.address, wall_label())
+    seats._seats[cell] = _Seat(mine, seats.clock.now_ns())
+    return Taking()
+
+
 _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.DriverLink.carry_out": _carried_out,
     "robolink.controllers.MotionGroupCore._marked": _moved_unmarked,
@@ -227,6 +235,14 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.markers.ProcedureLock.held": _open,
     "robolink.controllers.ControllerCore.procedure": _open,
     "robolink_cli.session.motion_consent.agree_to_motion": _nothing,
+    "robolink_cli.panel.guard.requests.PageRequest.foreign": _nothing,
+    "robolink_cli.panel.guard.requests.is_host": lambda *_given: True,
+    "robolink_cli.panel.guard.access.Access.is_paired": lambda *_given: True,
+    "robolink_cli.panel.guard.access.Access.why_not": lambda *_given, **_named: "",
+    "robolink_cli.panel.guard.access.Access.why_not_answer": lambda *_given: "",
+    "robolink_cli.panel.guard.people.Tries.pause_s": lambda *_given: 0.0,
+    "robolink_cli.panel.guard.seat.Seats.has": lambda *_given: True,
+    "robolink_cli.panel.guard.seat.Seats.take": _taken_from_anybody,
     "robolink.controllers.ToolTableCore.preview_write": _previewed,
     "robolink.controllers.ToolTableCore._require_known": _nothing,
     "robolink.model.ToolOffset.__post_init__": _nothing,

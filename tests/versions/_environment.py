@@ -37,6 +37,8 @@ CHOSEN: Final = (
     "tests/cli/test_refusals_of_every_command.py",
     "tests/cli/test_report_command.py",
     "tests/cli/wizard",
+    "tests/panel/access/test_tls_product.py",
+    "tests/panel/server",
     "tests/unit/structured_text/test_st_language.py",
     "tests/unit/test_config_files.py",
     "tests/unit/test_mailbox_link_can.py",
@@ -47,7 +49,9 @@ CHOSEN: Final = (
     "tests/unit/test_sim_kinematics.py",
     "tests/unit/test_sim_spel_expressions.py",
 )
-"""Tests of each dependency: files, prompts, tables, grammars, numbers, buses, the database."""
+"""Tests of each dependency: files, prompts, tables, grammars, numbers, buses, pages, the
+database.
+"""
 
 
 class NotRunError(Exception):

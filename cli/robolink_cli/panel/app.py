@@ -385,11 +385,14 @@ class Panel:
             "value": kind.name,
         }
         role = self._access.role(tablet.who, board.name)
+        station = board.station(kind, said.get("values"))
         why = ""
         if role is None or not may_begin(kind, role):
             why = tr("This takes an engineer.")
         elif board.job is not None:
             why = tr("A job is running on this cell already.")
+        elif kind.of_station and station is None:
+            why = tr("This cell has no such station.")
         if why:
             self._note("refused", board.name, why=in_english(why), **facts)
             return _refused(why)
@@ -401,6 +404,7 @@ class Panel:
                 language=taste.language,
                 who=tablet.who,
                 values=options_of(kind, said.get("values")),
+                station=station,
             )
         except OSError as error:
             cause = error.strerror or str(error)

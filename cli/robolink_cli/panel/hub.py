@@ -18,7 +18,7 @@ from robolink.messages import spoken, tr
 from robolink.transport import far_end_of
 from robolink_cli.console.output import show
 from robolink_cli.panel.cards import CellCard, JobOffer
-from robolink_cli.panel.jobs import KINDS, Job, JobKind
+from robolink_cli.panel.jobs import KINDS, JobKind, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
 from robolink_cli.panel.watch import AT_ONCE, CellWatch, Standing, card_of, standing_of
 from robolink_cli.panel.words import speaking_in
@@ -71,12 +71,17 @@ class PanelCell:
         url: Its controller.
         watch_s: How often it is looked at; ``None`` for only when a page is opened.
         simulated: Whether nothing real moves, as far as its URL says.
+        stations: Names of its stations.
+        tool: The tool that works there, with which stations are found; ``None`` where the cell
+            file says none.
     """
 
     name: str
     url: str
     watch_s: float | None = None
     simulated: bool = False
+    stations: tuple[str, ...] = ()
+    tool: int | None = None
 
 
 class Board:
@@ -95,7 +100,7 @@ class Board:
         self._changed = changed
         self.watch = CellWatch(cell.name, cell.url, cell.watch_s, self.renew, slots)
         self.standing = Standing()
-        self.job: Job | None = None
+        self.job: PanelJob | None = None
         self.said: tuple[str, ...] = ()
         self.base = (1 + secrets.randbelow(1000)) * _NUMBERS
         self.opened = False
@@ -176,15 +181,40 @@ class Board:
 
     def offers(self, watcher: Watcher) -> tuple[JobOffer, ...]:
         """Return the jobs that can be begun, in the language that is spoken."""
-        return tuple(
-            JobOffer(kind.name, spoken(kind.title), why_not=self._why_not(kind, watcher))
-            for kind in KINDS.values()
-            if self._is_of_use(kind)
-        )
+        found = list[JobOffer]()
+        for kind in filter(self._is_of_use, KINDS.values()):
+            why_not = self._why_not(kind, watcher)
+            if kind.of_station:
+                found += [
+                    JobOffer(
+                        kind.name,
+                        tr("Find the station {station} again", station=station),
+                        values={"station": station},
+                        why_not=why_not,
+                    )
+                    for station in self.cell.stations
+                ]
+            else:
+                found.append(JobOffer(kind.name, spoken(kind.title), why_not=why_not))
+        return tuple(found)
+
+    def station(self, kind: JobKind, given: object) -> tuple[str, int] | None:
+        """Return the station of a job and the tool that finds it; ``None`` where it has none.
+
+        Args:
+            kind: The job.
+            given: ``values`` of the press.
+        """
+        named = given.get("station") if isinstance(given, Mapping) else None
+        if not kind.of_station or self.cell.tool is None or named not in self.cell.stations:
+            return None
+        return str(named), self.cell.tool
 
     def _is_of_use(self, kind: JobKind) -> bool:
         if kind.name == "recover":
             return bool(self.standing.interrupted)
+        if kind.of_station:
+            return self.cell.tool is not None
         return kind.name != "release" or self.standing.stopped is not None
 
     def _why_not(self, kind: JobKind, watcher: Watcher) -> str:
@@ -194,7 +224,7 @@ class Board:
             return tr("This takes an engineer.")
         return ""
 
-    def _busy(self, watcher: Watcher, job: Job, seat: str) -> CellCard:
+    def _busy(self, watcher: Watcher, job: PanelJob, seat: str) -> CellCard:
         view = job.view
         title = spoken(job.kind.title)
         lines = [title] if view is None else [f"{title}: {view.head.title}"]
@@ -316,20 +346,28 @@ class Hub:
     # Jobs.
 
     async def begin(
-        self, board: Board, kind: JobKind, *, language: str, who: str, values: Mapping[str, str]
+        self,
+        board: Board,
+        kind: JobKind,
+        *,
+        language: str,
+        who: str,
+        values: Mapping[str, str],
+        station: tuple[str, int] | None = None,
     ) -> None:
         """Begin a job on a cell that has none.
 
         Raises:
             OSError: It cannot be started.
         """
-        job = Job(
+        job = PanelJob(
             board.name,
             kind,
             language=language,
             who=who,
             changed=board.renew,
             values=values,
+            station=station,
         )
         board.next_numbers()
         board.job, board.said = job, ()
@@ -341,7 +379,7 @@ class Hub:
         board.renew()
         self.spawn(self._until_end(board, job))
 
-    async def _until_end(self, board: Board, job: Job) -> None:
+    async def _until_end(self, board: Board, job: PanelJob) -> None:
         await job.wait()
         end = job.end
         if board.job is job:

@@ -45,6 +45,7 @@ class JobKind:
         words: The command.
         role: Who may begin it.
         values: The options that may go with it, and for each the option of the command.
+        of_station: Whether it is about one station of the cell, which the press names.
     """
 
     name: str
@@ -52,6 +53,7 @@ class JobKind:
     words: tuple[str, ...]
     role: PersonRole = PersonRole.OPERATOR
     values: Mapping[str, str] = field(default_factory=dict)
+    of_station: bool = False
 
 
 KINDS: Final = {
@@ -60,7 +62,15 @@ KINDS: Final = {
         JobKind("change", declared("Change a needle or nozzle"), ("change",)),
         JobKind("recover", declared("Finish or undo the interrupted job"), ("recover",)),
         JobKind("release", declared("Allow movement again after a stop"), ("robot", "release")),
+        JobKind("check", declared("Check the cell"), ("cell", "check")),
         JobKind("undo", declared("Undo the last tool change"), ("undo",), PersonRole.ENGINEER),
+        JobKind(
+            "station",
+            declared("Find a station again"),
+            ("cell", "station", "learn"),
+            PersonRole.ENGINEER,
+            of_station=True,
+        ),
     )
 }
 """The jobs, by name."""
@@ -86,7 +96,7 @@ class JobEnd:
         return self.code is not None
 
 
-class Job:
+class PanelJob:
     """One job of one cell.
 
     Args:
@@ -95,7 +105,8 @@ class Job:
         language: In which language.
         who: The person, for the record; empty for nobody.
         changed: Called when there is something new to show.
-        values: What goes with the command.
+        values: What goes with the command: options, and their values.
+        station: Whose place is found, and with which tool; ``None`` where it is about no station.
 
     Attributes:
         view: What it shows; ``None`` before it has shown anything.
@@ -116,10 +127,12 @@ class Job:
         who: str,
         changed: Callable[[], None],
         values: Mapping[str, str] | None = None,
+        station: tuple[str, int] | None = None,
     ) -> None:
         self.cell, self.kind, self.language, self.who = cell, kind, language, who
         self._changed = changed
         self._values = dict(values or {})
+        self._station = station
         self.view: View | None = None
         self.view_s = time.monotonic()
         self.told: deque[str] = deque(maxlen=_MOST_TOLD)
@@ -141,6 +154,9 @@ class Job:
         """The command line that it runs, without the program."""
         who = ["--operator", self.who] if self.who else []
         given = [word for name, value in self._values.items() for word in (name, value)]
+        if self._station is not None:
+            name, tool = self._station
+            given += ["--tool", str(tool), "--", name]
         return ["-c", self.cell, *who, *self.kind.words, *given]
 
     async def start(self) -> None:
@@ -159,7 +175,7 @@ class Job:
                 stdout=asyncio.subprocess.DEVNULL,
                 stderr=asyncio.subprocess.PIPE,
                 pass_fds=(its.fileno(),),
-                env={**os.environ, VARIABLE: self.language},
+                env={**os.environ, VARIABLE: self.language, "PYTHONIOENCODING": "utf-8"},
                 start_new_session=True,  # Ctrl-C is for the panel, which then ends it in order
             )
         except BaseException:
@@ -276,7 +292,7 @@ def options_of(kind: JobKind, given: object) -> dict[str, str]:
     }
 
 
-async def end_all(jobs: Iterable[Job], wait_s: float) -> list[Job]:
+async def end_all(jobs: Iterable[PanelJob], wait_s: float) -> list[PanelJob]:
     """End jobs in order; return those that take longer, and end by themselves."""
     running = [job for job in jobs if job.end is None]
     ended = await asyncio.gather(*(job.close(wait_s) for job in running))

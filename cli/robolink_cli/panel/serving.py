@@ -30,7 +30,7 @@ _LAST_ANSWERS_S: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PanelPlace:
     """Where the panel is served.
 
     Attributes:
@@ -80,7 +80,7 @@ class Served:
 
 
 async def serve(
-    served: Served, place: Place, *, ready: Callable[[str], None], ended: asyncio.Event
+    served: Served, place: PanelPlace, *, ready: Callable[[str], None], ended: asyncio.Event
 ) -> None:
     """Serve the panel until it is ended; then end its jobs in order.
 
@@ -136,7 +136,7 @@ async def serve(
             access.close()
 
 
-def _listening(place: Place, connections: Connections) -> socket.socket:
+def _listening(place: PanelPlace, connections: Connections) -> socket.socket:
     try:
         return listening(place.host, place.port, connections)
     except OSError as error:
@@ -160,7 +160,7 @@ class _Server(uvicorn.Server):
         yield
 
 
-def run(served: Served, place: Place, ready: Callable[[str], None]) -> None:
+def run(served: Served, place: PanelPlace, ready: Callable[[str], None]) -> None:
     """Serve the panel until SIGTERM or Ctrl-C; the arguments are those of :func:`serve`."""
 
     async def until_signal() -> None:

@@ -45,7 +45,7 @@ AT_ONCE: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class CellLook:
     """What a look showed.
 
     Attributes:
@@ -146,7 +146,7 @@ class CellWatch:
         self.cell, self.url, self.every_s = cell, url, every_s
         self._slots = slots
         self._changed = changed
-        self.look: Look | None = None
+        self.look: CellLook | None = None
         self.looking = False
 
     def is_due(self, now_s: float, *, wanted: bool) -> bool:
@@ -176,7 +176,7 @@ class CellWatch:
         self._changed()
 
 
-async def _looked(cell: str) -> Look:
+async def _looked(cell: str) -> CellLook:
     try:
         process = await asyncio.create_subprocess_exec(
             sys.executable,
@@ -184,7 +184,7 @@ async def _looked(cell: str) -> Look:
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
-            env={**os.environ, VARIABLE: ENGLISH},
+            env={**os.environ, VARIABLE: ENGLISH, "PYTHONIOENCODING": "utf-8"},
             start_new_session=os.name != "nt",
         )
         try:
@@ -192,14 +192,14 @@ async def _looked(cell: str) -> Look:
         except TimeoutError:
             process.kill()
             await process.wait()
-            return Look(time.monotonic(), wall_label(), failed=NO_ANSWER)
+            return CellLook(time.monotonic(), wall_label(), failed=NO_ANSWER)
         said = json.loads(out)
     except (OSError, ValueError) as error:
-        return Look(time.monotonic(), wall_label(), failed=str(error) or type(error).__name__)
+        return CellLook(time.monotonic(), wall_label(), failed=str(error) or type(error).__name__)
     now_s, at = time.monotonic(), wall_label()
     if "error" in said:
-        return Look(now_s, at, failed=str(said["error"].get("what", "")) or NO_ANSWER)
-    return Look(now_s, at, read=said)
+        return CellLook(now_s, at, failed=str(said["error"].get("what", "")) or NO_ANSWER)
+    return CellLook(now_s, at, read=said)
 
 
 def card_of(
@@ -241,7 +241,7 @@ def card_of(
     return replace(card, lines=(*lines, *said, *card.lines))
 
 
-def _mark(look: Look) -> str:
+def _mark(look: CellLook) -> str:
     read = look.read
     if any(read.get(flag) for flag in ("emergency_stop", "guard_open", "fault", "serious_fault")):
         return "bad"
@@ -250,7 +250,7 @@ def _mark(look: Look) -> str:
     return "ok"
 
 
-def _read(look: Look, now_s: float) -> tuple[str, ...]:
+def _read(look: CellLook, now_s: float) -> tuple[str, ...]:
     read, lines = look.read, list[str]()
     if read.get("held_by"):
         lines.append(tr("In use: {who}.", who=read["held_by"]))
@@ -263,9 +263,9 @@ def _read(look: Look, now_s: float) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _when(look: Look) -> str:
+def _when(look: CellLook) -> str:
     return tr("Last look: {time}.", time=_clock(look))
 
 
-def _clock(look: Look) -> str:
+def _clock(look: CellLook) -> str:
     return local_label(look.at)

@@ -23,6 +23,7 @@ from robolink_cli.wizard.happenings import (
     Effect,
     Happening,
     HasEnded,
+    HeldBack,
     KeyPressed,
     LineTyped,
     OffersAtTheEnd,
@@ -120,6 +121,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
     if isinstance(subject, CellIs):
         return _known(state, subject.simulated, subject.needle)
+    if isinstance(subject, HeldBack):
+        return replace(state, held_back=subject.why)
     if isinstance(subject, OffersAtTheEnd):
         return replace(state, offers=subject.offers)
     if isinstance(subject, TaughtPoints):
@@ -174,6 +177,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         reading=reading,
         question=asked,
         asked=asked.number,
+        held_back="",
         fresh=(),
         heard=state.fresh,
         page=0,

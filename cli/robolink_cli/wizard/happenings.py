@@ -62,6 +62,17 @@ class TaughtPoints:
 
 
 @dataclass(frozen=True, slots=True)
+class HeldBack:
+    """Something keeps a movement from beginning, or does so no longer.
+
+    Attributes:
+        why: What; empty for nothing.
+    """
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class WasTold:
     """The work showed a message."""
 

@@ -255,6 +255,7 @@ class WizardState:
         offers: What the last screen offers beside leaving it, where the job was carried out.
         wants: What the person chose there; ``None`` for leaving, and before.
         asked: Number of the last question, 0 before the first.
+        held_back: What keeps the next movement from beginning; empty for nothing.
     """
 
     header: Header
@@ -284,6 +285,7 @@ class WizardState:
     offers: frozenset[WizardCommand] = frozenset()
     wants: WizardCommand | None = None
     asked: int = 0
+    held_back: str = ""
 
     def says(self, message: str) -> "WizardState":
         """Return the same with another message."""

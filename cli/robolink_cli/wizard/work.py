@@ -17,6 +17,7 @@ from robolink.runner import MoveSubject, Question
 from robolink_cli.console.person import Person, person_here
 from robolink_cli.wizard.happenings import (
     Happening,
+    HeldBack,
     Reading,
     SendAnswer,
     WaitsForAnswer,
@@ -114,11 +115,13 @@ class Desk:
             heed()
             self._require_somebody()
             if reason != told:
+                self.regard(HeldBack(reason))
                 self.tell(reason)
                 told = reason
             self._look()
             time.sleep(GLANCE_S)
         if told:
+            self.regard(HeldBack(""))
             self.tell(tr("The robot goes on."))
 
     def _require_somebody(self) -> None:

@@ -162,6 +162,20 @@ def test_a_body_that_comes_slowly_is_not_waited_for(panel, monkeypatch):
     assert all(path != "/stop" for _, path, _ in panel.reached)
 
 
+def test_a_body_in_chunks_is_no_longer_than_another(panel):
+    tablet = panel.browser().load()
+    lines = "\r\n".join(f"{key}: {value}" for key, value in tablet.headers().items())
+    for chunks, status in ((1, b"200"), (9, b"413")):
+        said = json.dumps({"cell": CELL}) + " " * 500
+        chunk = f"{len(said):x}\r\n{said}\r\n" + f"{500:x}\r\n{' ' * 500}\r\n" * (chunks - 1)
+        with silent(panel) as line:
+            head = f"POST /stop HTTP/1.1\r\n{lines}\r\nTransfer-Encoding: chunked\r\n\r\n"
+            line.sendall(f"{head}{chunk}0\r\n\r\n".encode())
+            line.settimeout(5)
+            assert line.recv(4096).split()[1] == status
+    assert [path for _, path, _ in panel.reached].count("/stop") == 1
+
+
 def test_a_head_without_end_is_refused(panel):
     with silent(panel) as line:
         with suppress(OSError):

@@ -47,6 +47,21 @@ def test_it_is_paired_once_by_an_engineer(far_panel):
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
 
 
+def test_who_guesses_outside_makes_nobody_wait_at_a_paired_tablet(far_panel):
+    inside = far(far_panel)
+    inside.pair()
+    inside.load()
+    for number in range(5):
+        outside = far_panel.browser(name="cell.shop", source=f"127.0.0.{number + 9}")
+        assert outside.pair(MEI, "111222333444").status == 403
+    outside = far_panel.browser(name="cell.shop", source="127.0.0.99")
+    assert outside.pair(MEI).status == 429
+    assert inside.log_in(MEI).status == 200
+    for _ in range(5):
+        assert inside.log_in(MEI, "111222333444").status == 403
+    assert inside.log_in(MEI).status == 429
+
+
 def test_stop_needs_only_the_pairing_also_after_a_restart(tmp_path):
     panel = Panel(tmp_path, host="0.0.0.0", names=("cell.shop",))
     panel.set_pins()

@@ -15,8 +15,8 @@ from robolink_cli.panel.guard import access as access_module
 from robolink_cli.panel.guard.gate import LIVE, POSTS, REPORT_SECURITY
 from robolink_cli.panel.guard.people import Pins
 from robolink_cli.panel.hub import Hub, PanelCell
-from robolink_cli.panel.jobs import KINDS, Job, options_of
-from robolink_cli.panel.serving import Place, Served, serve
+from robolink_cli.panel.jobs import KINDS, PanelJob, options_of
+from robolink_cli.panel.serving import PanelPlace, Served, serve
 from robolink_cli.panel.watch import CellWatch
 from robolink_cli.wizard.views.wire import from_wire
 from starlette.routing import Route, WebSocketRoute
@@ -57,7 +57,7 @@ VIEW = {
 }
 
 
-class RunningJob(Job):
+class RunningJob(PanelJob):
     """A job without a process, which keeps what it is told."""
 
     def __init__(self, *given, **named):
@@ -103,7 +103,7 @@ class Product:
 
             cells = tuple(PanelCell(name, URL) for name in PEOPLE)
             served = Served(cells, PEOPLE, names, audit=self)
-            await serve(served, place or Place("127.0.0.1", 0), ready=told, ended=ended)
+            await serve(served, place or PanelPlace("127.0.0.1", 0), ready=told, ended=ended)
 
         thread = threading.Thread(target=lambda: asyncio.run(run()))
         thread.start()
@@ -295,7 +295,7 @@ def test_no_value_of_a_page_becomes_an_option_of_a_command(values, name):
     known = dict.fromkeys(kind.values, "x")
     for given_values in (values, {key: values.get(key, "--yes") for key in known}):
         options = options_of(kind, given_values)
-        job = Job(CELL, kind, language="en", who=MEI, changed=lambda: None, values=options)
+        job = PanelJob(CELL, kind, language="en", who=MEI, changed=lambda: None, values=options)
         line = job.arguments
         assert line[: 4 + len(kind.words)] == ["-c", CELL, "--operator", MEI, *kind.words]
         rest = line[4 + len(kind.words) :]

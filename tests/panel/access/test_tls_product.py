@@ -10,7 +10,7 @@ import pytest
 from robolink_cli.panel.guard import connections, tls
 from robolink_cli.panel.guard.pairing import PairedTablets
 from robolink_cli.panel.guard.people import Pins
-from robolink_cli.panel.serving import Place
+from robolink_cli.panel.serving import PanelPlace
 from robolink_cli.panel.watch import CellWatch
 
 from robolink.model import Secret
@@ -57,7 +57,7 @@ def product(state_folder, monkeypatch):
     Pins().set(MEI, Secret(PINS[MEI]))
     made = tls.make(("localhost",))
     product = Product()
-    place = Place("0.0.0.0", 0, str(made.path), str(made.key))
+    place = PanelPlace("0.0.0.0", 0, str(made.path), str(made.key))
     with product.served(place, names=made.names):
         product.trusts = ssl.create_default_context(cafile=str(made.path))
         yield product

@@ -2,7 +2,6 @@
 
 import time
 
-
 MIDDLE = """(selector) => {
   const box = document.querySelector(selector)?.getBoundingClientRect();
   return box && box.width ? {x: box.x + box.width / 2, y: box.y + box.height / 2} : null;

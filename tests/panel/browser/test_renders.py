@@ -19,17 +19,19 @@ LEAST = {"1280": 86, "1024": 67}
 
 FAULTS = """(least) => {
   const faults = [], text = (one) => one.textContent.trim().replace(/\\s+/g, ' ').slice(0, 60);
+  const fault = (what, one, ...sizes) => faults.push([what, text(one), ...sizes]);
   for (const one of document.querySelectorAll('header *, main *, footer *, #stop')) {
     const box = one.getBoundingClientRect();
     if (!box.width || one.closest('svg, .unseen, .steps')) continue;
-    if (box.right > innerWidth + 1 || box.left < -1) faults.push(['beyond the edge', text(one)]);
+    if (box.right > innerWidth + 1 || box.left < -1) fault('beyond the edge', one);
     if (one.matches('button, a, input:not([type=hidden])')) {
-      const wide = one.matches('input') ? least * 0.6 : least;
-      if (Math.min(box.width, box.height) < wide) faults.push(['small', text(one), box.width, box.height]);
+      const enough = one.matches('input') ? least * 0.6 : least;
+      if (Math.min(box.width, box.height) < enough) fault('small', one, box.width, box.height);
     }
-    const low = one.matches('.b, #stop, h1, .facts') && one.scrollHeight > one.clientHeight + 2;
-    if (low || (one.matches('.b, #stop, td, th, h1, .facts, .card p') && one.scrollWidth > one.clientWidth + 1))
-      faults.push(['cut', text(one), one.scrollWidth, one.clientWidth, one.scrollHeight, one.clientHeight]);
+    const high = one.matches('.b, #stop, h1, .facts') && one.scrollHeight > one.clientHeight + 2;
+    const isText = one.matches('.b, #stop, td, th, h1, .facts, .card p');
+    const wide = isText && one.scrollWidth > one.clientWidth + 1;
+    if (high || wide) fault('cut', one, one.scrollWidth, one.clientWidth, one.scrollHeight);
   }
   const main = document.getElementById('main');
   if (main.scrollHeight > main.clientHeight + 1 && main.dataset.long === undefined)
@@ -40,8 +42,10 @@ FAULTS = """(least) => {
 STOP_IS_FREE = """() => {
   const box = document.getElementById('stop').getBoundingClientRect();
   const places = [[.5, .5], [.08, .1], [.92, .1], [.08, .9], [.92, .9]];
-  return box.right > innerWidth - 2 && box.top < 2 && places.every(([x, y]) =>
-    document.elementFromPoint(box.left + x * box.width, box.top + y * box.height)?.closest('#stop'));
+  const {left, top, width, height} = box;
+  const at = (x, y) => document.elementFromPoint(left + x * width, top + y * height);
+  return box.right > innerWidth - 2 && box.top < 2 &&
+    places.every(([x, y]) => at(x, y)?.closest('#stop'));
 }"""
 
 
@@ -103,7 +107,7 @@ def look(page, size):
 
 
 def test_what_lies_over_a_page_leaves_stop_free(panel, screen):
-    size, _, page = screen
+    _, _, page = screen
     page.goto(panel.url)
     page.wait_for_selector("body:not(.silent)")
     panel.frozen = True
@@ -113,8 +117,8 @@ def test_what_lies_over_a_page_leaves_stop_free(panel, screen):
     assert page.evaluate(STOP_IS_FREE)
     found = page.evaluate(
         """() => [...document.querySelectorAll('.over')].filter((one) => {
-             const box = one.getBoundingClientRect();
-             return box.left < 0 || box.right > innerWidth || box.top < 0 || box.bottom > innerHeight;
+             const {left, right, top, bottom} = one.getBoundingClientRect();
+             return left < 0 || right > innerWidth || top < 0 || bottom > innerHeight;
            }).map((one) => one.id)"""
     )
     assert found == []

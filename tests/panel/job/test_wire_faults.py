@@ -10,8 +10,20 @@ import time
 
 import pytest
 from robolink_cli import main
-from robolink_cli.wizard.views.records import ChoiceView, EndView, QuestionView, TouchView
+from robolink_cli.wizard.happenings import HeldBack, WasRegarded
+from robolink_cli.wizard.screens.screen import screen_of
+from robolink_cli.wizard.views.records import (
+    ChoiceView,
+    EndView,
+    MovingView,
+    QuestionView,
+    TouchView,
+)
+from robolink_cli.wizard.views.view import view_of
 
+from robolink.model import Path, Pose
+from robolink.runner import MoveSubject
+from tests.cli.wizard._people import Sitting
 from tests.panel.job._tablet import Gone, Tablet, at_the_wire, to_the_jog
 
 JOG = ["robot", "jog", "--keys"]
@@ -334,3 +346,34 @@ def test_a_child_that_is_killed_leaves_what_recover_settles(robot):
     code, _ = at_the_wire(["-c", url, "recover"], settle)
     assert code == 0
     assert main.run(["-c", url, "robot", "jog", "z+1", "--yes"]) == 0
+
+
+def test_a_press_that_had_to_wait_is_not_carried_out_later(robot, monkeypatch):
+    """Who pressed, and saw nothing happen, has turned to something else."""
+    simulator, _, url = robot
+
+    def script(tablet):
+        to_the_jog(tablet)
+        monkeypatch.setattr("robolink_cli.wizard.faces.wire._FRESH_S", -1.0)
+        tablet.press("jog", "z+1")
+        tablet.see(lambda view: "busy" in view.message)
+        assert moves(simulator) == 0
+        tablet.press("leave")
+        tablet.body(EndView)
+        monkeypatch.undo()
+        tablet.press("finish")
+
+    assert at_the_wire(["-c", url, *JOG], script)[0] == 0
+
+
+def test_what_keeps_a_movement_back_stands_on_its_screen():
+    going = MoveSubject(Pose(300.0, 400.0, -60.0, 90.0, tool=0), Path.JOINT, 20.0, "Up.")
+    hand = Sitting().happens(WasRegarded(going))
+    assert screen_of(hand.state, hand.now).message == "The robot is moving."
+    hand.happens(WasRegarded(HeldBack("Input 5 is off.")))
+    assert screen_of(hand.state, hand.now).message == "Input 5 is off."
+    body = view_of(hand.state, hand.now).body
+    assert isinstance(body, MovingView)
+    assert body.held == "Input 5 is off."
+    hand.happens(WasRegarded(HeldBack("")))
+    assert screen_of(hand.state, hand.now).message == "The robot is moving."

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 from robolink_cli.panel import hub as hub_module
 from robolink_cli.panel.hub import BEAT_S, Hub, LivePage, PanelCell, may_begin
-from robolink_cli.panel.jobs import KINDS, JobEnd
+from robolink_cli.panel.jobs import KINDS, JobEnd, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
-from robolink_cli.panel.watch import CellWatch, Look, Standing, card_of
+from robolink_cli.panel.watch import CellLook, CellWatch, Standing, card_of
 from robolink_cli.wizard.views.records import Head, QuestionView, Status, View
 
 from robolink.model import Marker, MarkerKind
@@ -263,12 +263,12 @@ AT = "2026-11-30T03:00:00+00:00"
 
 
 def test_what_was_seen_is_never_shown_as_how_it_is_once_it_is_old():
-    look = Look(50.0, AT, READY)
+    look = CellLook(50.0, AT, READY)
     assert card(look, 1).mark == "ok"
     old = card(look, 11)
     assert old.mark == "unknown"
     assert "This is how it was at" in " ".join(old.lines)
-    by_another = Look(50.0, AT, {**READY, "held_by": "ann", "age_s": 30.0})
+    by_another = CellLook(50.0, AT, {**READY, "held_by": "ann", "age_s": 30.0})
     assert card(by_another, 1).mark == "unknown", "another process read it half a minute before"
 
 
@@ -284,18 +284,18 @@ def test_what_was_seen_is_never_shown_as_how_it_is_once_it_is_old():
     ],
 )
 def test_only_what_is_ready_and_free_is_called_so(read, mark):
-    assert card(Look(50.0, AT, read)).mark == mark
+    assert card(CellLook(50.0, AT, read)).mark == mark
 
 
 def test_a_cell_that_does_not_answer_shows_no_old_values():
-    shown = card(Look(50.0, AT, failed="no route"))
+    shown = card(CellLook(50.0, AT, failed="no route"))
     assert shown.mark == "unknown"
     assert shown.lines[0] == "no route"
 
 
 def test_an_open_job_counts_however_ready_the_controller_is(hub):
     marker = Marker("a", MarkerKind.CHANGE, "change of tool 1", AT, {})
-    shown = card(Look(50.0, AT, READY), standing=Standing((marker,)))
+    shown = card(CellLook(50.0, AT, READY), standing=Standing((marker,)))
     assert shown.mark == "look"
     board = hub.boards["line3"]
     board.standing = Standing((marker,))
@@ -310,12 +310,12 @@ def test_a_look_is_made_for_a_page_or_where_the_cell_file_asks_for_it():
     never = watch()
     assert not never.is_due(100.0, wanted=False)
     assert never.is_due(100.0, wanted=True)
-    never.look = Look(100.0, AT, READY)
+    never.look = CellLook(100.0, AT, READY)
     assert not never.is_due(10_000.0, wanted=False), "an idle cell was polled"
     assert not never.is_due(101.0, wanted=True), "six tabs would poll it"
     often = CellWatch("line3", CELL.url, 30.0, lambda: None, asyncio.Semaphore(1))
     assert often.is_due(0.0, wanted=False)
-    often.look = Look(100.0, AT, READY)
+    often.look = CellLook(100.0, AT, READY)
     assert not often.is_due(129.0, wanted=False)
     assert often.is_due(130.0, wanted=False)
 
@@ -326,3 +326,32 @@ def test_an_operator_begins_what_is_an_operators():
     assert may_begin(KINDS["undo"], "engineer")
     for nobody in ("", "onlooker"):
         assert not any(may_begin(kind, nobody) for kind in KINDS.values())
+
+
+def test_each_station_of_the_cell_file_is_offered_and_no_other_is_taken():
+    cell = PanelCell("line3", CELL.url, stations=("PIN-07", "--yes"), tool=2)
+    board = Hub([cell], FewPages(), NoSeats(), lambda *_, **__: None).boards["line3"]
+    offered = [dict(one.values) for one in board.offers(Watcher(role="engineer")) if one.values]
+    assert offered == [{"station": "PIN-07"}, {"station": "--yes"}]
+    kind = KINDS["station"]
+    assert board.station(kind, {"station": "PIN-07"}) == ("PIN-07", 2)
+    for wrong in (None, "PIN-07", {}, {"station": "PIN-08"}, {"station": ["PIN-07"]}, {"tool": 1}):
+        assert board.station(kind, wrong) is None
+    assert board.station(KINDS["change"], {"station": "PIN-07"}) is None
+    job = PanelJob(
+        "line3",
+        kind,
+        language="en",
+        who="mei",
+        changed=lambda: None,
+        station=board.station(kind, {"station": "--yes"}),
+    )
+    learn = ["cell", "station", "learn", "--tool", "2", "--", "--yes"]
+    assert job.arguments == ["-c", "line3", "--operator", "mei", *learn]
+
+
+def test_a_cell_that_names_no_tool_finds_no_station():
+    cell = PanelCell("line3", CELL.url, stations=("PIN-07",))
+    board = Hub([cell], FewPages(), NoSeats(), lambda *_, **__: None).boards["line3"]
+    assert "station" not in {one.job for one in board.offers(Watcher(role="engineer"))}
+    assert board.station(KINDS["station"], {"station": "PIN-07"}) is None

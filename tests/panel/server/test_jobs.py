@@ -8,10 +8,10 @@ import sys
 import time
 
 import pytest
-from robolink_cli.panel.jobs import KINDS, MOST_BYTES, Job, JobKind, end_all, options_of
+from robolink_cli.panel.jobs import KINDS, MOST_BYTES, JobKind, PanelJob, end_all, options_of
 
 
-class StandIn(Job):
+class StandIn(PanelJob):
     program = "tests.panel.server._child"
 
 

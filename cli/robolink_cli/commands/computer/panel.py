@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robolink.config import Cell
     from robolink_cli.commands.simulate.panel_cells import DemoCells
     from robolink_cli.panel.hub import PanelCell
-    from robolink_cli.panel.serving import Place, Served
+    from robolink_cli.panel.serving import PanelPlace, Served
 
 NEEDED: Final = ("starlette", "uvicorn", "websockets")
 """Packages of the extra, without which no page is served."""
@@ -136,7 +136,7 @@ def _demo(stack: ExitStack) -> "DemoCells":
 
 def _place(
     host: str, port: int, certificate: Path | None, key: Path | None
-) -> "tuple[Place, tuple[str, ...]]":
+) -> "tuple[PanelPlace, tuple[str, ...]]":
     """Return where the panel is served, and the names of its certificate.
 
     Raises:
@@ -144,12 +144,12 @@ def _place(
             be used.
     """
     from robolink_cli.panel.guard.access import is_loopback
-    from robolink_cli.panel.serving import Place
+    from robolink_cli.panel.serving import PanelPlace
 
     if (certificate is None) != (key is None):
         raise click.UsageError(tr("--tls-cert and --tls-key go together."))
     if certificate is None and is_loopback(host):
-        return Place(host, port), ()
+        return PanelPlace(host, port), ()
     require_packages(("cryptography",))
     from robolink_cli.panel.guard import tls
 
@@ -161,7 +161,7 @@ def _place(
         )
     found = tls.load(path, own_key)
     name = found.names[0].replace("*", "panel") if host in ("0.0.0.0", "::") else ""
-    return Place(host, port, str(found.path), str(found.key), name), found.names
+    return PanelPlace(host, port, str(found.path), str(found.key), name), found.names
 
 
 def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
@@ -201,7 +201,14 @@ def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
 def _shown(cell: "Cell") -> "PanelCell":
     from robolink_cli.panel.hub import PanelCell
 
-    return PanelCell(cell.name, cell.url, cell.settings.watch_s)
+    settings = cell.settings
+    return PanelCell(
+        cell.name,
+        cell.url,
+        settings.watch_s,
+        stations=tuple(settings.stations or ()),
+        tool=settings.tool,
+    )
 
 
 def _announce(url: str, served: "Served", simulated: "DemoCells | None") -> None:

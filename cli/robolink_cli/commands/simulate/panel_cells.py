@@ -88,8 +88,9 @@ def demo_cells() -> Iterator[DemoCells]:
             cells_file = folder / "robolink.toml"
             cells_file.write_text("\n".join(rows), encoding="utf-8")
             for name, recipe in _RECIPES.items():
-                content = (recipes_folder() / f"{recipe}.toml").read_bytes()
-                (folder / f"{name}.toml").write_bytes(content)
+                text = (recipes_folder() / f"{recipe}.toml").read_text(encoding="utf-8")
+                ours = text.replace("\nbasis = ", f'\ncells = ["{name}"]\nbasis = ', 1)
+                (folder / f"{name}.toml").write_text(ours, encoding="utf-8")
             assists = {name: one["assist"] for name, one in cells.items() if "assist" in one}
             yield DemoCells(folder, cells_file, folder / "state", assists, _pin(), pid)
     finally:

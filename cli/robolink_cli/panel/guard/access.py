@@ -335,7 +335,8 @@ class Access:
     def _proved(self, who: str, pin: str, visit: Visit) -> Denial | None:
         keys = [address_key(visit.address)]
         if self.highest_role(who) is not None and self.pins.mark(who):
-            keys.append(name_key(who))
+            # Whoever is outside makes nobody wait who stands at a paired tablet.
+            keys.append(name_key(who, outside=not self.is_paired(visit.tablet)))
         if pause_s := self.tries.pause_s(*keys):
             return Denial(429, "", "pause", pause_s)
         try:

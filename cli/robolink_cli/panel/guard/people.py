@@ -233,9 +233,14 @@ class Tries:
         return self.folder / file_name(key)
 
 
-def name_key(name: str) -> str:
-    """Return the key of a person for :class:`Tries`."""
-    return f"name {name}"
+def name_key(name: str, *, outside: bool = False) -> str:
+    """Return the key of a person for :class:`Tries`.
+
+    Args:
+        name: The person.
+        outside: Whether it is tried on a tablet that is not paired.
+    """
+    return f"name {name}, outside" if outside else f"name {name}"
 
 
 def address_key(address: str) -> str:

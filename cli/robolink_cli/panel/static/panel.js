@@ -17,7 +17,7 @@ const identity = () => Array.from(crypto.getRandomValues(new Uint8Array(12)), (b
 
 // The stream. Whatever is heard proves that it lives; a whole screen must have come by it too.
 let socket = null, begun = 0, ended = false, atMs = null, heard = -Infinity, fresh = false, silent = live, tries = 0;
-let number = Number(data.number), token = data.token, server = "", readAt = null, heardAt = null;
+let number = Number(data.number), token = data.token, server = "", readAt = null, lived = now(), heardAt = null;
 
 function connect() {
   const old = socket;
@@ -47,7 +47,6 @@ function send(frame) {
 
 function hear(frame) {
   heard = now();
-  heardAt = new Date();
   if (frame.t === "hello") {
     token = frame.token;
     if (server && server !== frame.server) renew();
@@ -88,12 +87,12 @@ function look() {
     silent = quiet > GREY_MS || !fresh;
     if (silent && held) release();
     page.classList.toggle("silent", silent);
-    const lost = silent && (heardAt !== null ? quiet > GREY_MS : now() > ANEW_MS);
+    if (!silent) { lived = heard; heardAt = new Date(Date.now() - quiet); }
+    const lost = silent && now() - lived > (heardAt ? GREY_MS : ANEW_MS);
     place("lost").hidden = !lost;
     if (lost) {
-      const since = heardAt === null ? now() : quiet;
-      say(place("lost").querySelector("[data-lost]"), {s: Math.floor(since / 1000)});
-      say(place("lost").querySelector("[data-heard]"), {at: heardAt ? heardAt.toLocaleTimeString(document.documentElement.lang) : "?"});
+      say(place("lost").querySelector("[data-lost]"), {s: Math.floor((now() - lived) / 1000)});
+      say(place("lost").querySelector("[data-heard]"), {at: heardAt ? heardAt.toLocaleTimeString("en-GB") : "?"});
       say(place("lost").querySelector("[data-tried]"), {n: tries});
     } else if (!silent) tries = 0;
     if ((quiet > ANEW_MS || ended) && now() - begun >= 1000) connect();

@@ -26,6 +26,9 @@ _TURN_S: Final = 0.02
 _AT_LEAST_S: Final = 0.1
 """Shortest time in seconds between two views."""
 
+_FRESH_S: Final = 0.5
+"""Age in seconds above which a press is not carried out any more."""
+
 _AGE_S: Final = 0.3
 """Interval in seconds at which a view is sent of which nothing but the age has changed."""
 
@@ -62,7 +65,7 @@ class WireFace:
             for happening in desk.happened():
                 self._happens(happening)
             for press in self._link.presses():
-                self._happens(press)
+                self._press(press)
             if ended and self._state.ended is None:
                 last = last_screen(self._state, work.error, time.monotonic())
                 self._happens(HasEnded(last))
@@ -86,6 +89,14 @@ class WireFace:
         self._state, effects = advance(self._state, happening)
         carry_out(self._desk, effects)
         self._left |= leaves(effects)
+
+    def _press(self, press: Pressed) -> None:
+        """Carry out a press; one that had to wait is none any more, but for the way out."""
+        if time.monotonic() - press.at_s <= _FRESH_S or press.action == "leave":
+            self._happens(press)
+            return
+        self._changed = True
+        self._state = self._state.says(tr("Pressed while this computer was busy. Press it again."))
 
     def _jog_held(self) -> None:
         """Send the next step of a key that is held, when the last one has ended."""
@@ -147,7 +158,7 @@ def _shorter(view: View) -> View:
         case WaitView(told=told) | QuestionView(told=told):
             return replace(view, body=replace(body, told=_half(told)))
         case _:
-            return replace(view, body=WaitView((tr("This is too long to be shown here."),)))
+            return replace(view, body=WaitView((tr("The rest is too long to be shown here."),)))
 
 
 def _half(lines: tuple[str, ...]) -> tuple[str, ...]:

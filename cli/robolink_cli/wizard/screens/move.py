@@ -127,7 +127,7 @@ def moving_screen(view: View, body: MovingView) -> Screen:
         (" " + tr("From above"), *lines, "", " " + legend, *([] if follows else [" " + unknown])),
         ((stop.key, stop.label), ("Esc", stop.label)),
         status=status_row(view.status),
-        message=tr("The robot is moving."),
+        message=body.held or tr("The robot is moving."),
     )
 
 

@@ -37,7 +37,8 @@ def moving_part(state: WizardState, subject: MoveSubject, now_s: float) -> Part:
     if reading is not None and here is not None:
         drawn = arm_picture(here, reading.axes, subject.target, follows=reading.follows)
     speed = _how_fast(subject, low_power=low_power)
-    body = MovingView(subject.purpose, subject.then, (*told, speed), drawn, left_s)
+    held = state.held_back
+    body = MovingView(subject.purpose, subject.then, (*told, speed), drawn, left_s, held)
     return Part(tr("On the way"), body, (leaves(tr("STOP")),), step_of_movement(state))
 
 

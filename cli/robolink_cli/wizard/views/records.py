@@ -194,6 +194,7 @@ class MovingView:
         told: Distance, turn and speed, a sentence each.
         picture: The arm; ``None`` without a position.
         left_s: About how long it still takes; ``None`` where that is not known.
+        held: What keeps it from beginning; empty where it has begun.
     """
 
     purpose: str
@@ -201,6 +202,7 @@ class MovingView:
     told: tuple[str, ...]
     picture: ArmPicture | None
     left_s: float | None
+    held: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -225,13 +225,23 @@ def prepare() -> None:
     _parser()
 
 
-@lru_cache(maxsize=1024)
 def parse(text: str) -> tuple[Statement, ...]:
     """Return the statements in one line, separated by semicolons.
 
     Raises:
         Refusal: The line is not SPEL+, or holds a statement that only programs may use.
     """
+    # A line with decimals leads to a place that hardly comes again, and would be kept for nothing.
+    passing = "." in text and _QUOTES.isdisjoint(text)
+    return _parsed(text) if passing else _kept(text)
+
+
+@lru_cache(maxsize=1024)
+def _kept(text: str) -> tuple[Statement, ...]:
+    return _parsed(text)
+
+
+def _parsed(text: str) -> tuple[Statement, ...]:
     shape, numbers = marked(text)
     fill = _shape(shape, len(numbers)) if numbers else None
     if fill is None:

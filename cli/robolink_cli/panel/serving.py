@@ -142,7 +142,7 @@ def _listening(place: PanelPlace, connections: Connections) -> socket.socket:
     except OSError as error:
         raise ConnectError(
             tr(
-                "The panel cannot listen at {host}:{port}: {cause}.",
+                "robolink cannot listen at {host}:{port}: {cause}.",
                 host=place.host,
                 port=place.port,
                 cause=error.strerror or error,

@@ -114,6 +114,7 @@ async def serve(
             lifespan="on",
             log_config=None,
             date_header=False,
+            ws="websockets-sansio",
             timeout_graceful_shutdown=_LAST_ANSWERS_S,
             ssl_certfile=place.certificate or None,
             ssl_keyfile=place.key or None,

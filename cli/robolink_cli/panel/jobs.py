@@ -61,7 +61,7 @@ KINDS: Final = {
     for kind in (
         JobKind("change", declared("Change a needle or nozzle"), ("change",)),
         JobKind("recover", declared("Finish or undo the interrupted job"), ("recover",)),
-        JobKind("release", declared("Allow movement again after a stop"), ("robot", "release")),
+        JobKind("release", declared("Allow movement again after a stop."), ("robot", "release")),
         JobKind("check", declared("Check the cell"), ("cell", "check")),
         JobKind("undo", declared("Undo the last tool change"), ("undo",), PersonRole.ENGINEER),
         JobKind(

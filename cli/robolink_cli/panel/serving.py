@@ -114,6 +114,7 @@ async def serve(
             lifespan="on",
             log_config=None,
             date_header=False,
+            ws="websockets-sansio",
             timeout_graceful_shutdown=_LAST_ANSWERS_S,
             ssl_certfile=place.certificate or None,
             ssl_keyfile=place.key or None,
@@ -142,7 +143,7 @@ def _listening(place: PanelPlace, connections: Connections) -> socket.socket:
     except OSError as error:
         raise ConnectError(
             tr(
-                "The panel cannot listen at {host}:{port}: {cause}.",
+                "robolink cannot listen at {host}:{port}: {cause}.",
                 host=place.host,
                 port=place.port,
                 cause=error.strerror or error,

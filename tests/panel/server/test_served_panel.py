@@ -21,6 +21,9 @@ from tests.panel.server._panel import PIN, Tablet, panel
 
 RECIPES = Path(__file__).parents[3] / "examples" / "recipes"
 
+# Each waits for processes to start, which a busy computer does slowly.
+pytestmark = pytest.mark.timeout(240)
+
 
 @pytest.fixture(scope="module")
 def cells(tmp_path_factory):

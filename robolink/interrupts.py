@@ -22,7 +22,7 @@ import signal
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from enum import StrEnum
 from types import FrameType, TracebackType
 from typing import Final, Self
@@ -331,11 +331,34 @@ class InterruptGate:
         if self._depth and _handler.heard_here():
             self._depth -= 1
             _handler.depth -= 1
-            _handler.let_out()
+            if _handler.held is not None:
+                _handler.let_out()
 
 
-@contextmanager
-def seen_through() -> Iterator[None]:
+class _SeenThrough(InterruptGate):
+    """A gate that is open for one block."""
+
+    def __enter__(self) -> None:
+        self.open()
+        try:
+            super().__enter__()
+        except BaseException:  # Ctrl-C came before the block had begun
+            self.close()
+            raise
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            super().__exit__(kind, error, trace)
+        finally:
+            self.close()
+
+
+def seen_through() -> AbstractContextManager[None]:
     """Delay Ctrl-C for a block that must be completed, whatever session is open.
 
     For what is stored and then noted in this process: an end in between would leave the two at
@@ -344,13 +367,7 @@ def seen_through() -> Iterator[None]:
     Raises:
         Interrupted: It came meanwhile.
     """
-    gate = InterruptGate()
-    gate.open()
-    try:
-        with gate:
-            yield
-    finally:
-        gate.close()
+    return _SeenThrough()
 
 
 _MAIN = threading.main_thread().ident

@@ -106,19 +106,26 @@ class AnswerTimes:
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
-        self.waited = self.moving = 0
+        self.waited, self.moving = 0.0, 0
         self._last_ns: deque[int] = deque(maxlen=_LAST_ANSWERS)
 
-    def answered(self, asked_ns: int, *, moving: bool = False) -> None:
+    def answered(self, asked_ns: int, *, moving: bool = False, awaited: bool = True) -> None:
         """Note an answer that came just now.
 
         Args:
             asked_ns: When its request was sent.
             moving: Whether a movement is under way.
+            awaited: Whether it counts at all: one that is only asked for because answers come at
+                once does not.
         """
         self._last_ns.append(self.clock.now_ns() - asked_ns)
-        self.waited += not moving
-        self.moving += moving
+        self.waited += awaited and not moving
+        self.moving += awaited and moving
+
+    @property
+    def last_s(self) -> float | None:
+        """The last answer; ``None`` before the first one."""
+        return self._last_ns[-1] / NS_PER_S if self._last_ns else None
 
     @property
     def median_s(self) -> float | None:

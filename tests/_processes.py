@@ -15,9 +15,12 @@ import traceback
 from collections.abc import Iterator
 from itertools import groupby
 from multiprocessing.connection import Connection, Pipe, wait
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests._warm_process import import_all
 
 _NUMBER = struct.Struct("H")
 """The format of a module's number in the pipe from which the processes take their work."""
@@ -45,8 +48,11 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
         return None
     if not hasattr(os, "fork"):
         raise pytest.UsageError("--processes needs a system that can fork; leave it out")
-    modules = [list(tests) for _, tests in groupby(session.items, lambda test: test.path)]
+    modules = [list(tests) for _, tests in groupby(session.items, _unit)]
+    # Tests of faults fork, which costs less while little was run: it copies tables of all memory.
+    modules.sort(key=lambda tests: "faults" not in tests[0].path.parts)
     queue = _numbers(len(modules))
+    import_all()  # once, and not in each of them
     session.config.get_terminal_writer().flush()
     session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
     runs = dict(_start(session, modules, queue, number) for number in range(count))
@@ -62,6 +68,12 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     if session.shouldstop:
         raise session.Interrupted(session.shouldstop)
     return True
+
+
+def _unit(test: pytest.Item) -> Path:
+    """Return the module of a test, or its folder where all modules use one database server."""
+    folder = test.path.parent
+    return folder if (folder / "_postgresql.py").exists() else test.path
 
 
 def _numbers(count: int) -> int:

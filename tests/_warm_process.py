@@ -134,7 +134,7 @@ def _serve(requests: socket.socket) -> None:
     """Fork a command for each request until the requesting process is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the commands
     gc.disable()  # imported objects are not garbage
-    _import_all()
+    import_all()
     gc.freeze()
     gc.enable()
     while True:
@@ -158,7 +158,8 @@ def _serve(requests: socket.socket) -> None:
             _become(json.loads(asked), ends)
 
 
-def _import_all() -> None:
+def import_all() -> None:
+    """Import what commands and simulators use, and read the grammar of SPEL+."""
     for name in ("robolink_cli", "robolink_simulators.epson", "robolink_simulators.softmotion"):
         package = import_module(name)
         for module in pkgutil.walk_packages(package.__path__, f"{name}."):

@@ -28,14 +28,13 @@ WHAT = {
 }
 """What is measured, by the answer time in milliseconds."""
 
-NEEDLE = "needle-beams"
-NEEDLE_WANTED = {
-    0: ("needle-beams, simulated time", 10.0),
-    20: ("needle-beams, simulated time, answers after 20 ms", 20.0),
-}
-"""What is measured and most seconds wanted, by the answer time in milliseconds."""
-NEEDLE_REQUESTS = 450
-"""Most requests wanted."""
+NEEDLE, PLC_NEEDLE = "needle-beams", "needle-beams on a PLC"
+NEEDLE_WANTED_S = {0: 10.0, 20: 20.0}
+"""Most seconds wanted, by the answer time in milliseconds."""
+REQUESTS_WANTED = {NEEDLE: 450, PLC_NEEDLE: 450}
+"""Most requests wanted, with answers after 20 ms."""
+PLC_KB_WANTED = 80.0
+"""Most kilobytes wanted of a mailbox, requests and answers without the frames of a network."""
 
 
 def measure_nozzle_change() -> Iterator[Figure]:
@@ -62,21 +61,29 @@ def measure_nozzle_change() -> Iterator[Figure]:
             1.0,
         )
     yield from measured_needle()
+    yield from measured_needle(PLC_NEEDLE)
 
 
-def measured_needle() -> Iterator[Figure]:
+def measured_needle(name: str = NEEDLE) -> Iterator[Figure]:
     """Yield simulated seconds and requests of a needle that is changed and measured on its beams.
 
     Turn test and all; its simulated time does not depend on the machine, so each is measured once.
+
+    Args:
+        name: Of its cell. That of a PLC yields its kilobytes, too.
     """
-    requests = 0
-    for answer_ms, (what, wanted_s) in NEEDLE_WANTED.items():
-        took_s, requests, _ = measured(NEEDLE, answer_ms)
-        wanted = Amount(wanted_s, "s")
-        yield Figure(what, Amount(took_s, "s"), "wanted", wanted, took_s / wanted_s, 1.0)
-    wanted = Amount(NEEDLE_REQUESTS, "")
-    ratio = requests / NEEDLE_REQUESTS
-    yield Figure(f"requests of {NEEDLE}", Amount(requests, ""), "wanted", wanted, ratio, 1.0)
+    for answer_ms, wanted_s in NEEDLE_WANTED_S.items():
+        took = measured(name, answer_ms)
+        what = f"{name}, simulated time"
+        what += f", answers after {answer_ms} ms" if answer_ms else ""
+        yield _wanted(what, took.took_s, "s", wanted_s)
+    yield _wanted(f"requests of {name}", took.exchanges, "", REQUESTS_WANTED[name])
+    if name == PLC_NEEDLE:
+        yield _wanted(f"traffic of {name}", took.traffic_bytes / 1000, "kB", PLC_KB_WANTED)
+
+
+def _wanted(what: str, found: float, unit: str, most: float) -> Figure:
+    return Figure(what, Amount(found, unit), "wanted", Amount(most, unit), found / most, 1.0)
 
 
 def _movement() -> int:

@@ -558,7 +558,8 @@ Function RlAround(p As Integer, bit1 As Integer, bit2 As Integer, turn As Double
   Move Here :Z(up)
 Fend
 
-' Drives the four sides of one round and sends it. Where an edge does not come it sends what came.
+' Drives the four sides of one round and sends it. Where an edge does not come it sends what came. From
+' behind a beam to the next corner it goes with the speed of travel; behind the last one it ends.
 Function RlRound(p As Integer, bit1 As Integer, bit2 As Integer, turn As Double, deeper As Double) As Boolean
   Integer side, k, bit, free, before, entry, leaving
   Boolean good
@@ -594,8 +595,11 @@ Function RlRound(p As Integer, bit1 As Integer, bit2 As Integer, turn As Double,
     place1$ = ",0,0"
     place2$ = ",0,0"
     place3$ = ""
+    If Abs(SpeedS(1) - RL_CROSSING_MM_S) > 0.001 Then
+      rl_even = 0
+    EndIf
     before = Sw(bit)
-    If before = free Then
+    If before = free And rl_even = 1 Then
       entry = RlEdge(k, turn, deeper, bit, 1 - free)
       place1$ = RlPlace$()
       If entry = 3 - free Then
@@ -603,8 +607,10 @@ Function RlRound(p As Integer, bit1 As Integer, bit2 As Integer, turn As Double,
         place2$ = RlPlace$()
         If leaving = 2 + free Then
           good = True
-          Move P(k) -Z(deeper) +U(turn)
           If side < 3 Then
+            SpeedS RL_TRAVEL_MM_S
+            Move P(k) -Z(deeper) +U(turn)
+            SpeedS RL_CROSSING_MM_S
             place3$ = RlPlace$()
           EndIf
         EndIf

@@ -7,18 +7,28 @@ run has shown is not guessed: it is left out, and that is said.
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass
 from itertools import islice
 from statistics import median
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from robolink.calibration_run._plan import ChangePlan
 from robolink.calibration_run._preview import PlannedStep
-from robolink.errors import DocumentError
+from robolink.controllers import JointRates
+from robolink.errors import DocumentError, NotReadyError, RejectedError
 from robolink.messages import joined, tr
-from robolink.model import Controller, EntryKind, NewEntry, Path, Recorded, from_json, to_json
-from robolink.runner import RobotTime, way_between
+from robolink.model import (
+    Controller,
+    EntryKind,
+    MotionProfile,
+    NewEntry,
+    Path,
+    Recorded,
+    from_json,
+    to_json,
+)
+from robolink.runner import ForeseesMovements, Rehearsal, RehearsedTime, RobotTime, way_between
 
 if TYPE_CHECKING:
     from robolink.recipe import Recipe
@@ -158,7 +168,10 @@ class Forecast:
         runs: How many earlier runs it rests on.
         changed: Whether there are earlier runs of this recipe, but of another form.
         answer_s: How long the controller takes to answer; ``None`` where nobody knows.
+        left_out: How many movements are not in it, because nobody knows how fast they are.
     """
+
+    json_version: ClassVar[int] = 2
 
     about_s: float | None
     straight_s: float
@@ -166,10 +179,18 @@ class Forecast:
     runs: int
     changed: bool
     answer_s: float | None
+    left_out: int = 0
 
     @property
     def sentence(self) -> str:
         """The same for a person."""
+        if self.about_s is not None and self.left_out:
+            return tr(
+                "The robot needs about {seconds} s, not counting moves of unknown speed ({count}) "
+                "and what you do yourself.",
+                seconds=_rounded(self.about_s),
+                count=self.left_out,
+            )
         if self.about_s is not None and self.with_journey:
             return tr(
                 "The robot needs about {seconds} s, not counting what you do yourself.",
@@ -201,6 +222,7 @@ class Forecast:
             "straight_moves_s": round(self.straight_s, 1),
             "with_move_to_start": self.with_journey,
             "earlier_runs": self.runs,
+            "moves_left_out": self.left_out,
             "changed": self.changed,
             "answer_ms": None if answer_s is None else round(answer_s * 1000, 1),
         }
@@ -221,6 +243,8 @@ class RunForecaster:
         work: Digest of what the robot does; see :func:`work_digest`.
         plan: The plan.
         steps: The foreseen steps of the measurement.
+        rehearse: Goes through the whole run, where it is not on record.
+        rates: How fast the joints are, where the cell file says it.
     """
 
     controller: Controller
@@ -229,6 +253,8 @@ class RunForecaster:
     work: str
     plan: ChangePlan
     steps: Sequence[PlannedStep]
+    rehearse: Callable[[], Rehearsal | None] = lambda: None
+    rates: JointRates | None = None
 
     def forecast(self) -> Forecast | None:
         """Return how long the robot will take; ``None`` where nothing moves.
@@ -247,12 +273,16 @@ class RunForecaster:
         journey, work = self._parts()
         travel = Travel.of(work)
         alike = [one for one in same if one.work == self.work and one.travel.is_like(travel)]
-        about_s, with_journey = None, False
-        if last := alike[:_LAST]:
+        about_s, with_journey, left_out = None, False, 0
+        last = alike[:_LAST]
+        if last:
             about_s = median(one.at(answer_s) for one in last)
             journey_s = self._journey_s(journey, [one for _, one in known], last[0], answer_s)
             with_journey = journey_s is not None
             about_s += journey_s or 0.0
+        elif calculated := self._calculated([one for _, one in known]):
+            about_s = calculated.seconds + calculated.answers * (answer_s or 0.0)
+            with_journey, left_out = True, calculated.left_out
         return Forecast(
             about_s,
             Travel.of(one for one in self.steps if one.edge is None).straight_mm
@@ -261,6 +291,7 @@ class RunForecaster:
             len(last),
             bool(same and not last),
             answer_s,
+            left_out,
         )
 
     def entry(self, time: RobotTime, change: str) -> NewEntry | None:
@@ -300,6 +331,35 @@ class RunForecaster:
             details={"times": to_json(times)},
         )
 
+    def _calculated(self, runs: Sequence[RunTimes]) -> RehearsedTime | None:
+        """Return how long the run takes by its movements; ``None`` where nobody can tell."""
+        rehearsal = self.rehearse()
+        group = self.controller.groups[0] if rehearsal is not None else None
+        if rehearsal is None or not isinstance(group, ForeseesMovements):
+            return None
+        try:
+            times = group.movement_times(self.rates)
+        except (RejectedError, NotReadyError):
+            return None
+        limits, moves = self.plan.limits, self._at_these_speeds(runs)
+        return rehearsal.takes(
+            times,
+            MotionProfile(Path.JOINT, limits.speed_percent, limits.speed_mm_s),
+            tools=len(self.plan.tools),
+            otherwise=lambda path, way: _like_s(moves, path, way, limits.speed_mm_s),
+        )
+
+    def _at_these_speeds(self, runs: Sequence[RunTimes]) -> list[Timed]:
+        """Return the movements of earlier runs at the speeds of this one."""
+        limits = self.plan.limits
+        speeds = limits.speed_percent, limits.speed_mm_s
+        return [
+            move
+            for one in runs
+            if (one.speed_percent, one.speed_mm_s) == speeds
+            for move in one.moves
+        ]
+
     def _parts(self) -> tuple[Sequence[PlannedStep], Sequence[PlannedStep]]:
         """Return the steps of the way to the start, and those from there on."""
         start, steps = self.plan.start, self.steps
@@ -317,17 +377,9 @@ class RunForecaster:
         answer_s: float | None,
     ) -> float | None:
         """Return how long the way to the start takes; ``None`` where nobody knows."""
-        limits = self.plan.limits
-        speeds = limits.speed_percent, limits.speed_mm_s
-        moves = [
-            move
-            for one in runs
-            if (one.speed_percent, one.speed_mm_s) == speeds
-            for move in one.moves
-        ]
-        whole_s = 0.0
+        moves, whole_s = self._at_these_speeds(runs), 0.0
         for step in journey:
-            seconds = _move_s(step, moves, limits.speed_mm_s)
+            seconds = _move_s(step, moves, self.plan.limits.speed_mm_s)
             if seconds is None:
                 return None
             whole_s += seconds + last.move_answers * (answer_s or 0.0)
@@ -338,8 +390,14 @@ def _move_s(step: PlannedStep, moves: Sequence[Timed], speed_mm_s: float) -> flo
     """Return how long a movement takes, from others of the same robot at the same speeds."""
     if step.target is None or step.start is None or step.profile is None:
         return 0.0
-    length_mm, turn_deg = way_between(step.start, step.target)
-    path = step.profile.path
+    return _like_s(moves, step.profile.path, way_between(step.start, step.target), speed_mm_s)
+
+
+def _like_s(
+    moves: Sequence[Timed], path: Path, way: tuple[float, float], speed_mm_s: float
+) -> float | None:
+    """Return how long a way takes, from the times of others."""
+    length_mm, turn_deg = way
     own = [(mm, deg, seconds) for of, mm, deg, seconds in moves if of == path]
     lengths = [(mm, seconds) for mm, deg, seconds in own if deg <= _ALIKE_DEG]
     turns = [(deg, seconds) for _, deg, seconds in own if deg > _ALIKE_DEG]
@@ -348,6 +406,11 @@ def _move_s(step: PlannedStep, moves: Sequence[Timed], speed_mm_s: float) -> flo
         longest_mm, seconds = max(lengths)
         along_s = seconds + (length_mm - longest_mm) / speed_mm_s
     around_s = _between(turns, turn_deg, _ALIKE_DEG)
+    if along_s is None and around_s is not None:
+        # A way as long that took no longer than this turn shows that the turn takes longer.
+        most_s = around_s * (1 + _ALIKE)
+        shown = (mm * (1 + _ALIKE) >= length_mm and seconds <= most_s for mm, _, seconds in own)
+        along_s = 0.0 if any(shown) else None
     return None if along_s is None or around_s is None else max(along_s, around_s)
 
 

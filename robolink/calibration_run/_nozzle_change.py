@@ -81,6 +81,7 @@ class NozzleChange:
         order: The order that it carries out (:func:`robolink.transaction.carrying_out`).
         describe: Makes the result of the order, plain JSON, from what the change did.
         robot_time: Counts how long the robot takes.
+        before_write: Looks, and refuses if need be, when everything is measured and agreed to.
 
     Example:
         >>> from robolink.methods import PointsSource
@@ -110,8 +111,10 @@ class NozzleChange:
         order: Order | None = None,
         describe: DescribeReport | None = None,
         robot_time: RobotTime | None = None,
+        before_write: Callable[[MeasurementContext, Proposals], None] | None = None,
     ) -> None:
         self._controller = controller
+        self._before_write = before_write
         self._time = robot_time or RobotTime(controller)
         limits = controller.change_guard.limits
         tools = (replace(one, criteria=one.criteria.within(limits)) for one in plan.tools)
@@ -344,6 +347,8 @@ class NozzleChange:
 
     def _write(self, context: MeasurementContext, proposals: Proposals) -> tuple[ToolReport, ...]:
         """Write all, test each, keep all; an error on the way restores all."""
+        if self._before_write is not None:
+            self._before_write(context, proposals)
         verify = any(plan.verify and plan.moving for plan, _ in proposals)
         known = [dict(plan.details(proposal)) for plan, proposal in proposals]
         wanted = [

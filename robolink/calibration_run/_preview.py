@@ -1,21 +1,23 @@
 """The preview of a nozzle change: every step with its target, before anything moves."""
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, Final, cast
 
-from robolink.calibration import flange_of
+from robolink.calibration import flange_of, tip_pose
 from robolink.calibration_run._plan import (
     ChangePlan,
+    Proposals,
+    ToolPlan,
     journey,
     require_clearance,
     require_inputs,
     require_measurable,
     require_motion,
 )
-from robolink.errors import LimitError
-from robolink.messages import tr
+from robolink.errors import CalibrationError, ConfigError, ConnectError, LimitError
+from robolink.messages import joined, tr
 from robolink.model import (
     Controller,
     InputEdge,
@@ -25,14 +27,24 @@ from robolink.model import (
     Pose,
     ToolOffset,
 )
-from robolink.procedures import MovingSource
+from robolink.procedures import (
+    KeepsProof,
+    KeptProof,
+    LookSource,
+    MeasurementContext,
+    MovingSource,
+)
+from robolink.procedures.source_bases import InputSource
 from robolink.runner import (
     ArmAhead,
     Ask,
     ForeseenStep,
     Look,
     Move,
+    Operator,
     Procedure,
+    Rehearsal,
+    RehearsedStep,
     RunSettings,
     Seek,
     TeachPrompt,
@@ -129,6 +141,111 @@ def foresee(
     return tuple(_planned_steps(steps, settings, arm))
 
 
+def rehearse(
+    controller: Controller,
+    plan: ChangePlan,
+    *,
+    here: Pose,
+    stored: Mapping[int, ToolOffset | None],
+    writes: bool = True,
+) -> Rehearsal | None:
+    """Go through a whole run as it will be if each tip is where its stored offset puts it.
+
+    Reads what the procedures want to know of the controller; nothing moves.
+
+    Args:
+        controller: The controller.
+        plan: The plan.
+        here: Where the flange is.
+        stored: The stored offset of each tool.
+        writes: Whether the tools are written, and their turn tests made.
+
+    Returns:
+        ``None`` where a procedure needs answers that nobody can expect.
+    """
+    rehearsal = Rehearsal(here)
+    context = MeasurementContext(
+        controller, cast(Operator, None), start=here, settings=plan.limits.settings
+    )
+    try:
+        rehearsal.run(journey(plan.safe, tr("Moving to the safe pose."), here))
+        proofs = [
+            proof
+            for one in plan.tools
+            if one.moving is not None
+            for proof in _rehearsed(rehearsal, context, one, one.moving, stored.get(one.tool))
+        ]
+        if writes:
+            for proof in proofs:
+                if not _prove(rehearsal, proof):
+                    return None
+        _back_to_flange(rehearsal)
+        if plan.safe is not None:
+            u_deg = plan.safe.u_deg if plan.turn_back else rehearsal.here.u_deg
+            goal = replace(plan.safe, u_deg=u_deg)
+            rehearsal.run(journey(goal, tr("Moving to the safe pose."), rehearsal.here))
+    except _NOTHING_MADE_OF_IT:
+        return None
+    return rehearsal
+
+
+_NOTHING_MADE_OF_IT: Final = (
+    CalibrationError,
+    LimitError,
+    ConfigError,
+    ConnectError,
+    ArithmeticError,
+    TypeError,
+    ValueError,
+)
+"""What a procedure, perhaps of another package, may raise at answers that only are expected; the
+run itself does not depend on them."""
+
+
+def _rehearsed(
+    rehearsal: Rehearsal,
+    context: MeasurementContext,
+    plan: ToolPlan,
+    source: MovingSource,
+    stored: ToolOffset | None,
+) -> Iterator[KeptProof]:
+    """Go through the measurement of one tool, and yield its turn test."""
+    there = tr("Moving to the station for tool {tool}.", tool=plan.tool)
+    rehearsal.run(journey(plan.approach, there, rehearsal.here))
+    told = source.told_by(context) if isinstance(source, InputSource) else source
+    result = rehearsal.run(told.procedure(stored, rehearsal.here))
+    if isinstance(source, LookSource):
+        with source.opened() as camera:
+            rehearsal.settle_s = camera.settle_s
+    context.stands = rehearsal.here
+    away = tr("Leaving the station of tool {tool}.", tool=plan.tool)
+    rehearsal.run(journey(plan.retreat, away, rehearsal.here))
+    if plan.verify and isinstance(source, KeepsProof):
+        yield source.proof(
+            context,
+            plan.tool,
+            result,
+            tip=result.offset,
+            tolerance_mm=plan.criteria.drift_tolerance_mm,
+        )
+
+
+def _prove(rehearsal: Rehearsal, proof: KeptProof) -> bool:
+    """Go through a turn test, in the frame of the written tool; false if its steps are unknown."""
+    _back_to_flange(rehearsal)
+    frame = proof.written
+    rehearsal.select(tip_pose(rehearsal.here, frame, tool=proof.tool), frame)
+    steps = proof.foreseen(rehearsal.here)
+    if steps is not None:
+        rehearsal.run(steps)
+    return steps is not None
+
+
+def _back_to_flange(rehearsal: Rehearsal) -> None:
+    if rehearsal.frame != ToolOffset():
+        rehearsal.select(flange_of(rehearsal.here, rehearsal.frame), ToolOffset())
+
+
 def flange_now(controller: Controller) -> Pose:
     """Read where the flange is, whichever tool is selected."""
     here = controller.groups[0].pose()
@@ -144,14 +261,103 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
     """
     for step in steps:
         if step.refusal:
-            raise LimitError(
-                tr("{step} {refusal}", step=step.text, refusal=step.refusal),
-                remedy=tr(
-                    "Jog the tip closer to the station, or widen the allowed area. If the arm "
-                    "cannot reach: move the station."
-                ),
-                controller=controller.identity,
-            )
+            what = tr("{step} {refusal}", step=step.text, refusal=step.refusal)
+            raise _refused(controller, what)
+
+
+def _refused(controller: Controller, what: str) -> LimitError:
+    return LimitError(
+        what,
+        remedy=tr(
+            "Jog the tip closer to the station, or widen the allowed area. If the arm "
+            "cannot reach: move the station."
+        ),
+        controller=controller.identity,
+    )
+
+
+def require_turn_test(controller: Controller, plan: ChangePlan, rehearsal: Rehearsal) -> None:
+    """Refuse a turn test that could be made with no tip that this change may find; only reads.
+
+    The new tip is not where the stored offset puts it, but not farther from there than the largest
+    change that is believed. So what the arm does not reach with the stored offset is asked for
+    other tips on that circle too, and a place outside the box must be outside by more than that.
+
+    Args:
+        controller: The controller.
+        plan: The plan.
+        rehearsal: The run, gone through with each tip where it is expected.
+
+    Raises:
+        LimitError: Names the step; nothing moved.
+    """
+    slack_mm = max(one.criteria.max_change_mm for one in plan.tools)
+    _require_made(controller, plan, rehearsal, slack_mm, tr("Nothing moved."))
+
+
+def require_proofs(
+    controller: Controller, plan: ChangePlan, context: MeasurementContext, proposals: Proposals
+) -> None:
+    """Refuse to write what the turn test could not prove, now that the tips are known; only reads.
+
+    Args:
+        controller: The controller.
+        plan: The plan.
+        context: What the sources work with.
+        proposals: What would be written.
+
+    Raises:
+        LimitError: Names the step; nothing was written.
+    """
+    rehearsal = Rehearsal(flange_now(controller))
+    try:
+        for one, proposal in proposals:
+            source, tolerance_mm = one.source, one.criteria.drift_tolerance_mm
+            if not one.verify or not isinstance(source, KeepsProof):
+                continue
+            result, tip = proposal.result, proposal.tip
+            proof = source.proof(context, one.tool, result, tip=tip, tolerance_mm=tolerance_mm)
+            if not _prove(rehearsal, proof):
+                return
+    except _NOTHING_MADE_OF_IT:
+        return  # the test itself decides
+    rehearsal.began = context.start or rehearsal.began
+    _require_made(controller, plan, rehearsal, 0.0, tr("Nothing was written."))
+
+
+def _require_made(
+    controller: Controller, plan: ChangePlan, rehearsal: Rehearsal, slack_mm: float, stands: str
+) -> None:
+    """Refuse turn tests that cannot be made with the tips so far beside their places."""
+    for step in rehearsal.turning:
+        if refusal := _outside(plan, rehearsal.began, step, slack_mm):
+            raise _refused(controller, _turn_test(step, refusal))
+    far = rehearsal.beyond_reach(controller, slack_mm)
+    if far is not None:
+        refusal = tr("The robot cannot reach that place with its tool turned that way.")
+        remedy = tr(
+            "Let the turn test turn the tool another way, or move the station to where the arm has "
+            "room to turn it."
+        )
+        raise LimitError(
+            _turn_test(far, refusal),
+            remedy=joined(" ", (stands, remedy)),
+            controller=controller.identity,
+        )
+
+
+def _turn_test(step: RehearsedStep, refusal: str) -> str:
+    return tr("Turn test: {step} {refusal}", step=step.purpose, refusal=refusal)
+
+
+def _outside(plan: ChangePlan, start: Pose, step: RehearsedStep, slack_mm: float) -> str:
+    """Return why the box forbids a step of the turn test, empty if it does not."""
+    box = plan.limits.settings(start, step.frame).box.larger(sideways_mm=slack_mm, up_mm=slack_mm)
+    try:
+        replace(box, z_min_mm=box.z_min_mm - slack_mm).check(step.farthest)
+    except LimitError as error:
+        return error.what
+    return ""
 
 
 def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:

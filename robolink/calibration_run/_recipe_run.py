@@ -1,6 +1,6 @@
 """One run of a recipe: preflight, then the nozzle change with what the recipe adds."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING
 
 from robolink.calibration_run._forecast import Forecast, RunForecaster, work_digest
 from robolink.calibration_run._nozzle_change import DescribeReport, NozzleChange
-from robolink.calibration_run._plan import ChangePlan, require_ready
-from robolink.calibration_run._preview import preview, require_inside
+from robolink.calibration_run._plan import ChangePlan, Proposals, require_ready
+from robolink.calibration_run._preview import (
+    PlannedStep,
+    preview,
+    rehearse,
+    require_inside,
+    require_proofs,
+    require_turn_test,
+)
 from robolink.calibration_run._proposal import ChangeReport, Listener
 from robolink.calibration_run._recipe_listener import RecipeListener
 from robolink.calibration_run._recipe_plan import Reference, find_reference, located, plan_of
 from robolink.config import Cell
+from robolink.controllers import JointRates
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import listed, tr
 from robolink.model import (
@@ -22,11 +30,13 @@ from robolink.model import (
     LookingController,
     PersonRole,
     TipSensor,
+    ToolOffset,
     says_it_is_simulated,
 )
+from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, beyond
 from robolink.remedy_words import RemedyWord, remedy_word
-from robolink.runner import Operator, RobotTime
+from robolink.runner import Operator, Rehearsal, RobotTime
 from robolink.stations import Station, find_stations, require_base_of, stations_on_record
 from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
 
@@ -140,6 +150,8 @@ class RecipeRun:
         self.forecast: Forecast | None = None
         self.robot_s: float | None = None
         self._of_file = loaded.recipe
+        self._rates = _rates(cell)
+        self._before_write: Callable[[MeasurementContext, Proposals], None] | None = None
         self._other_sensor = sensor if isinstance(sensor, str) else "" if sensor is None else "own"
         self._ahead: RunForecaster | None = None
 
@@ -150,7 +162,8 @@ class RecipeRun:
             CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
             ConfigError: The recipe's numbers are those of a simulated cell, and this is none.
             ConnectError: A camera is not there.
-            LimitError: A foreseen target lies outside the box.
+            LimitError: A foreseen target lies outside the box, or the arm cannot turn the tool for
+                the turn test.
             NotReadyError: The station was learnt in another base.
             NotAllowedError: A jump is accepted by somebody who is no engineer.
             OutcomeUnknownError: An earlier job is unfinished.
@@ -199,8 +212,29 @@ class RecipeRun:
             work_digest(self._of_file, self.plan, version=version),
             self.plan,
             steps,
+            partial(self._rehearsed, stored, steps),
+            self._rates,
         )
         self.forecast = self._ahead.forecast()
+
+    def _rehearsed(
+        self, stored: Mapping[int, ToolOffset | None], steps: Sequence[PlannedStep]
+    ) -> Rehearsal | None:
+        """Go through the run as it will be if the tips are where they are expected.
+
+        Raises:
+            LimitError: The turn test cannot be made, whatever is measured.
+        """
+        here = next((one.start for one in steps if one.start is not None), None)
+        if here is None:
+            return None
+        writes = not (self.takes_reference or self._measure_only)
+        gone = rehearse(self._controller, self.plan, here=here, stored=stored, writes=writes)
+        if gone is not None and writes:
+            require_turn_test(self._controller, self.plan, gone)
+            # No run like this one has shown it: asked once more, for the tips that are found.
+            self._before_write = partial(require_proofs, self._controller, self.plan)
+        return gone
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
         """Ask for the ids of nozzles and lots before anything moves; yield each.
@@ -268,6 +302,7 @@ class RecipeRun:
             order=self._order,
             describe=self._describe,
             robot_time=time,
+            before_write=self._before_write,
         )
 
     @contextmanager
@@ -326,6 +361,13 @@ class RecipeRun:
                     accept_jump=remedy_word(RemedyWord.ACCEPT_JUMP),
                 ),
             )
+
+
+def _rates(cell: Cell | None) -> JointRates | None:
+    """Return how fast the joints are, where the cell file says it."""
+    if cell is None or cell.settings.joint_speeds is None:
+        return None
+    return JointRates(cell.settings.joint_speeds, cell.settings.joint_accelerations or ())
 
 
 def _require_cell(loaded: "LoadedRecipe", cell: Cell | None) -> None:

@@ -196,6 +196,8 @@ class AccuracySettings(BaseModel):
 
 Text = Annotated[str, Field(min_length=1)]
 
+EachJoint = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_length=6)]
+
 _LEAST_MM_S2, _HIGHEST_MM_S2 = ACCELERATION_RANGE_MM_S2
 
 
@@ -217,6 +219,9 @@ class CellSettings(BaseModel):
         speed_mm_s: Speed of moves, in low power.
         acceleration_mm_s2: Highest acceleration of straight movements; it is only ever lowered
             to this.
+        joint_speeds, joint_accelerations: Highest speed and acceleration of each joint at 100 %,
+            degrees and mm, where nobody else tells them: robolink only calculates with them how
+            long the robot will take.
         box_mm: How far, sideways, the flange may go in a calibration.
         jog_box_mm: How far the tool may be jogged, in every direction.
         lift_mm, clearance_mm: How far the tip is lifted before it turns, and how far above
@@ -251,6 +256,8 @@ class CellSettings(BaseModel):
     remote_timeout_confirmed_by: Annotated[Text | None, Field(validate_default=True)] = None
     speed_mm_s: Annotated[float, Field(ge=1, le=100)] | None = None
     acceleration_mm_s2: Annotated[int, Field(ge=_LEAST_MM_S2, le=_HIGHEST_MM_S2)] | None = None
+    joint_speeds: EachJoint | None = None
+    joint_accelerations: Annotated[EachJoint | None, Field(validate_default=True)] = None
     box_mm: Annotated[float, Field(ge=1)] | None = None
     jog_box_mm: Positive | None = None
     lift_mm: Annotated[float, Field(ge=1, le=100)] | None = None
@@ -292,6 +299,17 @@ class CellSettings(BaseModel):
         if able is not None and not able.acceleration:
             raise ValueError(tr("cannot apply: robolink does not move controllers of this kind"))
         return stated
+
+    @field_validator("joint_accelerations")
+    @classmethod
+    def _belongs_to_the_speeds(
+        cls, each: tuple[float, ...] | None, info: ValidationInfo
+    ) -> tuple[float, ...] | None:
+        # An invalid value is missing from the data and already reported.
+        speeds = info.data.get("joint_speeds", ...)
+        if speeds is not ... and len(speeds or ()) != len(each or ()):
+            raise ValueError(tr("must have as many values as joint_speeds"))
+        return each
 
     @field_validator("remote_timeout_confirmed_by")
     @classmethod

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from robolink.controllers.model_axes import axes_of_model as axes_of_model
     from robolink.controllers.motion_group import MotionGroupCore as MotionGroupCore
     from robolink.controllers.motion_group import PolledGroup as PolledGroup
+    from robolink.controllers.movement_time import AnswerCounts as AnswerCounts
+    from robolink.controllers.movement_time import JointRates as JointRates
+    from robolink.controllers.movement_time import MovementTimes as MovementTimes
+    from robolink.controllers.movement_time import Way as Way
     from robolink.controllers.plc_map.controller import FlangeReader as FlangeReader
     from robolink.controllers.plc_map.controller import PlcMapController as PlcMapController
     from robolink.controllers.plc_map.controller import open_plc_map as open_plc_map
@@ -55,6 +59,7 @@ else:
             "epson.tools": "PublishedTools",
             "epson.values": "EpsonVariables typed_value variable_type",
             "motion_group": "MotionGroupCore PolledGroup",
+            "movement_time": "AnswerCounts JointRates MovementTimes Way",
             "plc_map.controller": "FlangeReader PlcMapController open_plc_map",
             "preserving": "Preserver",
             "model_axes": "axes_of_model",

@@ -32,6 +32,7 @@ from robolink.model import (
     VariableTable,
 )
 from robolink.timing import AnswerTimes
+from robolink.transport.traffic import present_listeners
 
 if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
@@ -94,6 +95,7 @@ class ControllerCore(DriverPart, ABC):
         tools: ToolTable,
     ) -> None:
         super().__init__(link)
+        self._listeners = present_listeners()
         self.identity = link.identity
         self.clock = link.clock
         self.latch = link.latch
@@ -136,6 +138,11 @@ class ControllerCore(DriverPart, ABC):
         """Do what is proper before the link is closed; errors are ignored."""
 
     # What a kind may have; created only when a command needs it.
+
+    @property
+    def traffic_bytes(self) -> int | None:
+        """Bytes sent and received so far; see :class:`robolink.model.Controller`."""
+        return self._listeners.count if self._listeners and self._listeners.links else None
 
     @property
     def answers(self) -> AnswerTimes | None:

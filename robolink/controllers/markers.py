@@ -5,8 +5,9 @@ What keeps two procedures of this process apart stands here too.
 
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
+from types import TracebackType
 from typing import Final
 
 from robolink import runtime
@@ -163,16 +164,20 @@ class ProcedureLock:
             self._waiting.remove(me)
             self._room.notify_all()
 
-    @contextmanager
-    def _leased(self, request: str, *, wanted: bool = True) -> Iterator[bool]:
+    def _leased(
+        self, request: str, *, wanted: bool = True
+    ) -> AbstractContextManager[bool, bool | None]:
         """Wait for the lease if this call may wait, and keep it for the block.
 
         So nobody comes in between what is read and what is written. A record that cannot be kept
         is told by what needs it.
         """
-        if not (wanted and self.patience.waits and self._depth == 1):
-            yield False
-            return
+        if wanted and self.patience.waits and self._depth == 1:
+            return self._lease_kept(request)
+        return nullcontext(False)
+
+    @contextmanager
+    def _lease_kept(self, request: str) -> Iterator[bool]:
         with ExitStack() as held:
 
             def take() -> None:
@@ -188,6 +193,28 @@ class ProcedureLock:
                 yield False
                 return
             yield True
+
+
+class _Doubt:
+    """See :meth:`MarkerStore.doubt`; each exchange of a movement is made in one."""
+
+    __slots__ = ("_markers", "_request")
+
+    def __init__(self, markers: "MarkerStore", request: str) -> None:
+        self._markers = markers
+        self._request = request
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if isinstance(error, (TransportError, RemoteProtocolError)):
+            raise self._markers.unproved(self._request, error) from error
 
 
 class MarkerStore:
@@ -434,13 +461,9 @@ class MarkerStore:
         }
         return [m for m in self.outcomes.open_markers() if m.operation not in own]
 
-    @contextmanager
-    def doubt(self, request: str) -> Iterator[None]:
+    def doubt(self, request: str) -> AbstractContextManager[None]:
         """Turn a lost answer inside the block into OutcomeUnknownError."""
-        try:
-            yield
-        except (TransportError, RemoteProtocolError) as error:
-            raise self.unproved(request, error) from error
+        return _Doubt(self, request)
 
     def unproved(self, request: str, error: RobolinkError) -> OutcomeUnknownError:
         """Return the error for a request whose effect ``error`` leaves unknown."""

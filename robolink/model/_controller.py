@@ -214,8 +214,7 @@ def require_acceleration(stated_mm_s2: int, controller: "Controller | None" = No
 class Controller(Protocol):
     """A connected controller.
 
-    Every call may raise a TransportError or RemoteProtocolError; after one the link is dead
-    and a new connection is needed.
+    Every call may raise a TransportError or RemoteProtocolError. Then a new connection is needed.
     """
 
     @property
@@ -260,6 +259,10 @@ class Controller(Protocol):
     @property
     def exchanges(self) -> int:
         """Requests sent so far."""
+
+    @property
+    def traffic_bytes(self) -> int | None:
+        """Bytes sent and received so far; ``None`` where its link does not count them."""
 
     @property
     def answers(self) -> AnswerTimes | None:
@@ -463,8 +466,7 @@ def is_simulated_name(name: str) -> bool:
         >>> is_simulated_name("epson:C-SIM0A1B2C3D/SIM0A1B2C3D"), is_simulated_name("softmotion:1A")
         (True, False)
     """
-    parts = re.split(r"[:/+#]", name)
-    return _MEDIUM in name or any(map(_SERIAL.fullmatch, parts))
+    return _MEDIUM in name or any(map(_SERIAL.fullmatch, re.split(r"[:/+#]", name)))
 
 
 def are_simulated_facts(facts: ControllerFacts) -> bool:
@@ -492,8 +494,7 @@ def says_it_is_simulated(controller: Controller, facts: ControllerFacts | None =
     if is_simulated_name(controller.identity):
         return True
     try:
-        if are_simulated_facts(controller.facts() if facts is None else facts):
-            return True
-        return controller.condition().get("simulated") is True
+        known = controller.facts() if facts is None else facts
+        return are_simulated_facts(known) or controller.condition().get("simulated") is True
     except ControllerError:
         return False

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
-from numbers import Real
 from typing import Final, Protocol
 
 from robolink.errors import ConfigError, LimitError, NotReadyError, NotReadyReason
@@ -221,14 +220,13 @@ class WorkBox:
             ConfigError: It is no pose.
             LimitError: Names the axis, the value and the limit.
         """
-        numbers = isinstance(target, Pose) and all(
-            isinstance(value, Real) for value in target.coordinates()
-        )
-        if not numbers:
+        if not isinstance(target, Pose):  # and a pose holds numbers
             raise ConfigError(
                 tr("A target is a Pose of numbers, not {given!r}.", given=target),
                 remedy=tr("Nothing moved. Write Pose(x, y, z, u), in mm and degrees."),
             )
+        if self.holds(target):
+            return
         for axis in "xyz":
             value = getattr(target, f"{axis}_mm")
             low, high = getattr(self, f"{axis}_min_mm"), getattr(self, f"{axis}_max_mm")

@@ -270,7 +270,11 @@ class CameraDrive:
         middle, there = self._middle(place), self.pose(place)
         expected_mm = (middle[0] + at.x_mm - there.x_mm, middle[1] + at.y_mm - there.y_mm)
         look: SeenAt = yield Look(
-            tr("Checking whether the spot moves with the tip."), expected_mm, place.mark, pictures
+            tr("Checking whether the spot moves with the tip."),
+            expected_mm,
+            place.mark,
+            pictures,
+            in_pixels=not self.calibrated,
         )
         return self.watch.heard(look)
 
@@ -397,7 +401,13 @@ class CameraDrive:
             else tr("Looking at fiducial {n}.", n=place.mark)
         )
         try:
-            seen: SeenAt = yield Look(purpose, self._middle(place), place.mark, self.plan.pictures)
+            seen: SeenAt = yield Look(
+                purpose,
+                self._middle(place),
+                place.mark,
+                self.plan.pictures,
+                in_pixels=not self.calibrated,
+            )
         except CalibrationError:
             yield from self.lifted(place)
             raise

@@ -55,6 +55,14 @@ class KeptProof(ABC):
         """Why it cannot be kept, as a code; empty if it can."""
         return ""
 
+    def foreseen(self, here: Pose) -> Procedure[VerifyResult] | None:  # noqa: ARG002 - for overriding
+        """Return its steps for a look ahead; ``None`` where nobody knows them.
+
+        Args:
+            here: Where the frame of the new tool is after the measurement.
+        """
+        return None
+
     @abstractmethod
     def prove(self, context: MeasurementContext) -> VerifyResult:
         """Make it right after the write, where the measurement left the tip; the tool is selected.
@@ -83,6 +91,10 @@ class PlacedProof(KeptProof):
     def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
         """Make it; see :meth:`KeptProof.prove_after_a_break`."""
         return context.run(self.steps_after_a_break(_here(context)), tip=self.written)
+
+    def foreseen(self, here: Pose) -> Procedure[VerifyResult] | None:
+        """Return its steps; see :meth:`KeptProof.foreseen`."""
+        return self.steps(here)
 
     def moves(self, here: Pose) -> int:
         """Return how many movements there are; see :meth:`KeptProof.moves`."""

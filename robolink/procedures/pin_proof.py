@@ -317,6 +317,10 @@ class TurnTest(KeptProof):
         """Return how many movements there are; see :meth:`KeptProof.moves`."""
         return 1 + _MOVES_PER_ANGLE * len(self.angles_deg)
 
+    def foreseen(self, here: Pose) -> Procedure[VerifyResult] | None:  # noqa: ARG002 - as for moves
+        """Return its steps, each stop at its highest; see :meth:`KeptProof.foreseen`."""
+        return replace(self, touch=replace(self.touch, nominal=True)).steps()
+
     def prove(self, context: MeasurementContext) -> VerifyResult:
         """Make it; see :meth:`KeptProof.prove`."""
         return context.run(self.steps(), tip=self.written)

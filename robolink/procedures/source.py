@@ -223,7 +223,7 @@ class MeasurementContext:
             'yes'
         """
         group = self.controller.groups[0]
-        if isinstance(camera, ControllerSensor):
+        if camera is not None and isinstance(camera, ControllerSensor):
             camera = camera.beside(self.controller)
         # If nothing moves, there is nothing to limit, and perhaps no pose to read.
         start = Pose(0.0, 0.0, 0.0, 0.0) if self.start is None else self.start

@@ -64,6 +64,10 @@ class TiltingProof(PlacedProof):
         lifted = offset_z(contact, self.touch.lift_mm)
         return 1 + movements(on_paper.steps(lifted), lifted)
 
+    def foreseen(self, here: Pose) -> Procedure[VerifyResult] | None:
+        """Return its steps, each stop at its highest; see :meth:`KeptProof.foreseen`."""
+        return replace(self, touch=replace(self.touch, nominal=True)).steps(here)
+
     def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:  # noqa: ARG002 - a person shows where it is
         """Return the steps from wherever the robot stands; a person touches first.
 

@@ -70,8 +70,7 @@ def fresh_seed() -> int:
 
 def plain_pose(pose: Pose) -> Pose:
     """Return a pose without how it was taken."""
-    kept = Pose(*pose.coordinates(), hand=pose.hand, local=pose.local, tool=pose.tool)
-    return replace(kept, posture=pose.posture)
+    return Pose(*pose.coordinates(), pose.hand, pose.local, pose.tool, pose.posture)
 
 
 TOUCH_CODES: Final = (

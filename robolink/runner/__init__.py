@@ -42,6 +42,14 @@ from robolink.runner._prompt_context import (
     awaited_line,
     regard,
 )
+from robolink.runner._rehearsal import (
+    ForeseesMovements,
+    Rehearsal,
+    RehearsedKind,
+    RehearsedStep,
+    RehearsedTime,
+    TellsReach,
+)
 from robolink.runner._robot_time import RobotTime, TimedMove, TimeShare, way_between
 from robolink.runner._runner import EndingWatch, Runner, ask_for_pose
 from robolink.runner._steps import (
@@ -79,6 +87,7 @@ __all__ = [
     "FitRow",
     "FitSubject",
     "ForeseenStep",
+    "ForeseesMovements",
     "GuidedOperator",
     "JogRange",
     "JogSubject",
@@ -95,6 +104,10 @@ __all__ = [
     "POLL_S",
     "Procedure",
     "Question",
+    "Rehearsal",
+    "RehearsedKind",
+    "RehearsedStep",
+    "RehearsedTime",
     "RobotTime",
     "RunSettings",
     "Runner",
@@ -106,6 +119,7 @@ __all__ = [
     "TakenAgainError",
     "TakenStep",
     "TeachPrompt",
+    "TellsReach",
     "TimeShare",
     "TimedMove",
     "TouchSubject",

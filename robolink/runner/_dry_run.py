@@ -195,10 +195,15 @@ class ArmAhead:
 
     def obstacle(self, move: Move, start: Pose | None) -> str:
         """Return why the arm cannot make a movement of the flange, empty if it can."""
-        begin = None if start is None else self._tip(start)
-        return self.group.obstacle(self._tip(move.target), move.path, start=begin)
+        begin = None if start is None else self.tip(start)
+        return self.group.obstacle(self.tip(move.target), move.path, start=begin)
 
-    def _tip(self, flange: Pose) -> Pose:
+    def tip(self, flange: Pose) -> Pose:
+        """Return where the frame of the selected tool is with the flange at a pose.
+
+        Args:
+            flange: That pose.
+        """
         if self.selected is None:
             return flange
         return tip_pose(flange, self.selected, tool=self.tool)

@@ -2,7 +2,9 @@
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final
 
 from robolink.errors import ConfigError, LimitError
@@ -201,6 +203,12 @@ def parse_steps(text: str) -> dict[str, float]:
     Raises:
         ConfigError: Anything else, or an axis twice.
     """
+    return dict(_read_steps(text))
+
+
+@lru_cache(maxsize=64)
+def _read_steps(text: str) -> Mapping[str, float]:
+    """Read steps; the same text is read where it is checked, carried out and counted."""
     refuse_decimal_comma(text)
     plain = _narrow(text)
     deltas: dict[str, float] = {}
@@ -235,6 +243,8 @@ def refuse_decimal_comma(text: str) -> None:
         >>> refuse_decimal_comma("x+0.1, z-0.5")  # it parts two steps here
     """
     plain = _narrow(text)
+    if "," not in plain:
+        return
     pointed = _COMMA.sub(r"\1.\2", plain)
     if pointed != plain:
         raise ConfigError(

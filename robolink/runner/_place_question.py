@@ -71,6 +71,7 @@ class PlaceQuestion:
         line: Fetches what is typed.
         runs: Tells whether the controller was at work when it was looked at last.
         typed: Reads a typed pose, given where the frame is; ``None`` where none is taken.
+        guided: The operator, if it is shown what it is asked about.
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class PlaceQuestion:
         line: Line,
         runs: Callable[[], bool],
         typed: Callable[[str, Pose], Pose] | None = None,
+        guided: GuidedOperator | None = None,
     ) -> None:
         self._step = step
         self._controller = controller
@@ -99,7 +101,7 @@ class PlaceQuestion:
         self._contact = _ContactWatch(inputs_of(controller), edge) if edge else None
         self._asked_ns = 0
         self._steps = StepsTaken(controller.clock)
-        self._guided = operator if isinstance(operator, GuidedOperator) else None
+        self._guided = guided
 
     def answer(self) -> TouchedAt:
         """Ask until the person confirms the place; return the pose, and how it was taken.

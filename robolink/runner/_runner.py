@@ -360,6 +360,7 @@ class Runner:
             line=self._line,
             runs=lambda: self._runs,
             typed=self._typed_pose if self._types else None,
+            guided=self._guided,
         )
         with self.robot_time.person():
             return self._stood(question.answer())

@@ -175,12 +175,21 @@ class Seek:
     When the input shows the edge already, or not on the way, whoever runs the procedure throws
     CalibrationError ``edge_passed`` or ``no_edge`` into it. The frame is then where it was, or
     at ``target``.
+
+    Attributes:
+        target: How far it goes at most.
+        edge: What ends it.
+        speed_mm_s: How fast it goes.
+        purpose: What for, for a person.
+        expected: About where the frame stops, to foresee how long it takes; ``None`` where nobody
+            knows.
     """
 
     target: Pose
     edge: InputEdge
     speed_mm_s: float
     purpose: str
+    expected: Pose | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,12 +204,14 @@ class Look:
         expected_mm: Where in the base, X and Y, the mark should be.
         mark: The tip, or the number of a fiducial.
         pictures: How many are taken; the median of them counts.
+        in_pixels: Whether the answer is in pixels of which nobody knows yet how long they are.
     """
 
     purpose: str
     expected_mm: tuple[float, float]
     mark: int = TIP
     pictures: int = 3
+    in_pixels: bool = field(default=False, compare=False)
 
 
 def _as_it_is(pose: Pose) -> dict[str, Any]:

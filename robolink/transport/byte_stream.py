@@ -142,6 +142,7 @@ class TracingTransport:
         """See :meth:`robolink.transport.Transport.send`; a secret never reaches the sink."""
         # Checked here, once per exchange: without a listener, the cost would be paid by everyone.
         self._told = self._listened()
+        self.traffic.count += len(data)
         if secret or self._told:
             self.traffic.sent(data, secret=secret)
         self._send(data, deadline=deadline, secret=secret)
@@ -149,6 +150,7 @@ class TracingTransport:
     def receive(self, *, deadline: Deadline) -> bytes:
         """See :meth:`robolink.transport.Transport.receive`."""
         data = self._receive(deadline=deadline)
+        self.traffic.count += len(data)
         if self._told:
             self.traffic.received(data)
         return data
@@ -156,8 +158,10 @@ class TracingTransport:
     def receive_waiting(self) -> bytes | None:
         """See :meth:`robolink.transport.Transport.receive_waiting`."""
         data = self._receive_waiting()
-        if data is not None and self._told:
-            self.traffic.received(data)
+        if data is not None:
+            self.traffic.count += len(data)
+            if self._told:
+                self.traffic.received(data)
         return data
 
     def wait_readable(self, *, deadline: Deadline) -> bool:

@@ -43,12 +43,17 @@ class Listeners:
 
     Attributes:
         sinks: Each is told of all traffic.
-        links: How many links tell it.
+        links: The traffic of each link.
     """
 
     def __init__(self, sinks: tuple[TraceSink, ...] = ()) -> None:
         self.sinks = sinks
-        self.links = 0
+        self.links: list[Traffic] = []
+
+    @property
+    def count(self) -> int:
+        """The bytes sent and received on all links so far."""
+        return sum(link.count for link in self.links)
 
 
 class _ThisThread(local):
@@ -94,6 +99,11 @@ def told_to(*sinks: TraceSink | None) -> Iterator[Listeners]:
             outer.links += listeners.links
 
 
+def present_listeners() -> Listeners | None:
+    """Return who receives the traffic of links that are opened now; ``None`` outside of a block."""
+    return _here.listeners
+
+
 def told_alike(opened: Callable[_P, _R]) -> Callable[_P, _R]:
     """Report the traffic of a link that is opened later to the present listeners.
 
@@ -125,6 +135,10 @@ class Traffic:
         sinks: Told in addition.
         log: Logger of the package that moves the bytes; ``None`` logs nothing.
 
+    Attributes:
+        count: The bytes sent and received so far. The link adds them, whether anybody listens or
+            not.
+
     Example:
         >>> from robolink.timing import SystemClock
         >>> from robolink.transport import Traffic
@@ -148,9 +162,9 @@ class Traffic:
     ) -> None:
         listeners = _here.listeners
         if listeners is not None and log is not None:
-            listeners.links += 1
+            listeners.links.append(self)
             sinks = (*listeners.sinks, *sinks)
-        self.controller = controller
+        self.controller, self.count = controller, 0
         self._clock, self._sinks, self._log = clock, sinks, log
         self._debugs = _never if log is None else log.debugs
         self._request = ""

@@ -1,11 +1,14 @@
 """A mailbox link without bytes of its own, such as that of a simulator inside this process."""
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import MailboxHead, MailboxLink
 from robolink.transport.traffic import Traffic
+
+_BYTES: Final = 2
+"""Of a word."""
 
 _WordsT = TypeVar("_WordsT", tuple[int, ...], MailboxHead)
 
@@ -96,11 +99,13 @@ class WordTraffic(MailboxLinkAround):
         return WordTraffic(self._inner.reopened(timeout_s=timeout_s), self._traffic)
 
     def _sent(self, request: str, words: Sequence[int]) -> None:
+        self._traffic.count += _BYTES * len(words)
         if self._traffic.listened():
             self._traffic.sent(_as_bytes(words), request=request)
 
     def _read(self, request: str, read: Callable[[], _WordsT]) -> _WordsT:
         words = read()
+        self._traffic.count += _BYTES * len(words)
         if self._traffic.listened():
             self._traffic.received(_as_bytes(words), request=request)
         return words

@@ -1,6 +1,7 @@
 """Options as they are declared, and every help page in 80 columns and in each language."""
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
@@ -10,11 +11,13 @@ from click.testing import CliRunner
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from robolink_cli import main
+from robolink_cli.console import language
 from robolink_cli.console.help_pages import WideHelpFormatter
 from robolink_cli.console.tables import columns
 from robolink_cli.options.declaration import CliArgument, CliOption, add_declared, declared_options
 
 from robolink import messages
+from robolink.locale import languages
 
 # Every help page fits into 80 columns, in whole sentences, in each language alike.
 
@@ -38,6 +41,8 @@ def pages(command=main.cli, path=()):
 def shown(request, monkeypatch, capsys):
     """Every page, by its path."""
     monkeypatch.setenv("COLUMNS", "80")
+    # A catalogue is read once, and not for each page.
+    monkeypatch.setattr(language, "translator", cache(languages.translator))
     texts = {}
     try:
         for path in pages():

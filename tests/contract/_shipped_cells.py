@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
 
+from robolink_simulators.cell.frames import Z_AXIS, Frame, about
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -24,6 +25,8 @@ from tests.contract._sensor_cell import sensor_cell
 
 EXAMPLES: Final = Path(__file__).parents[2] / "examples" / "recipes"
 BEAMS_MM: Final = (175.0, 488.0, -106.0)
+START_MM_OF_THE_NEEDLE: Final = (158.6, 495.4, -80.0)
+"""Where the flange of the EPSON's needle is before its change."""
 PIN_MM_OF_THE_NEEDLE: Final = 0.35
 """By how much the needle of the one-touch recipe is longer than the one before."""
 
@@ -52,6 +55,36 @@ class ShippedCell:
     def words(self) -> tuple[str, ...]:
         """What lets the change run with nobody there, its result as a document."""
         return ("--nozzle", "N-7", "--lot", "L", "--yes", "--json")
+
+
+AXES: Final = {
+    "Kin_5Axes": ([500, 500, 500, 720, 360], [5000, 5000, 5000, 3600, 1800]),
+    "Kin_Gantry3": ([500, 500, 500], [5000, 5000, 5000]),
+    "T6-602S": ([360, 540, 1000, 1500], [1800, 2700, 5000, 7500]),
+}
+"""Joint speeds and accelerations of the simulated machines, as a cell file states them."""
+
+
+@contextmanager
+def with_cell_file(cell: ShippedCell, machine: str, *more: str) -> Iterator[ShippedCell]:
+    """Name a cell in a file that states how fast its joints are.
+
+    Args:
+        cell: The cell.
+        machine: Whose joints; those that a model has by itself are not stated.
+        more: Further lines.
+    """
+    speeds, accelerations = AXES.get(machine, (None, None))
+    lines = [f'[cells.shop]\nurl = "{cell.url}"', *more]
+    if cell.url.startswith("epson"):
+        lines += ["remote_timeout_s = 60", 'remote_timeout_confirmed_by = "M. Li, today"']
+    if speeds:
+        lines += [f"joint_speeds = {speeds}", f"joint_accelerations = {accelerations}"]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robolink.toml"
+        path.write_text("\n".join(lines) + "\n")
+        with patch.dict(os.environ, {"ROBOLINK_CONFIG": str(path)}):
+            yield replace(cell, url="shop")
 
 
 @contextmanager
@@ -109,6 +142,32 @@ def _on_a_plc(name: str, kinematics: str, seed: int, touches: str = "") -> Itera
         yield ShippedCell(simulator, url, EXAMPLES / name, person)
 
 
+@contextmanager
+def _needle_on_a_plc(rounds: int = 1, seed: int = 3) -> Iterator[ShippedCell]:
+    """Set up the beams of the needle around a PLC's arm of the same lengths, at the same place.
+
+    Args:
+        rounds: How often it goes around the beams. The recipe says once; on a PLC that is too
+            little for some needles (docs/reference/sensors.md 3).
+        seed: Of the cell.
+    """
+    arms = {"dArmLength1": 325.0, "dArmLength2": 275.0}
+    simulator = SoftMotionSimulator(seed=seed, parameters=arms)
+    group = simulator.plc.group
+    start = Frame(START_MM_OF_THE_NEEDLE, about(Z_AXIS, 0.0))
+    configuration = group.kinematics.configuration(group.values)
+    group.place(group.kinematics.axes_for(start, configuration, group.values))
+    for number, heading_deg in ((3, 2.0), (4, 91.0)):
+        beam = LightBeam(BEAMS_MM, heading_deg, radius_mm=0.1)
+        simulator.world.connect(number, beam, noise_mm=0.003)
+    text = (EXAMPLES / "needle-beams.toml").read_text()
+    assert "repeats = 1 " in text
+    with served(simulator) as url, tempfile.TemporaryDirectory() as folder:
+        recipe = Path(folder) / "needle-beams.toml"
+        recipe.write_text(text.replace("repeats = 1 ", f"repeats = {rounds} "))
+        yield ShippedCell(simulator, url, recipe, ())
+
+
 CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
     "scara-pin": lambda: touched("scara-pin.toml"),
     "two-nozzles": lambda: touched("two-nozzles.toml"),
@@ -123,6 +182,12 @@ CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
     "sphere": lambda: _on_a_plc("sphere.toml", "Kin_5Axes", 4, "sphere"),
 }
 """The cell of each shipped recipe that moves a robot; by ``pendant-points`` nothing moves."""
+
+PLC_CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
+    "needle-beams on a PLC": _needle_on_a_plc,
+    "needle-beams on a PLC, two rounds": lambda: _needle_on_a_plc(rounds=2),
+}
+"""The cell of a PLC for a recipe that is made for an EPSON."""
 
 
 @contextmanager
@@ -154,7 +219,7 @@ def shipped_cell(name: str, answer_ms: float = 0.0) -> Iterator[ShippedCell]:
     folder = tempfile.mkdtemp(prefix="robolink-shipped-")
     os.environ["ROBOLINK_STATE_DIR"] = folder
     try:
-        with CELLS[name]() as cell:
+        with (CELLS | PLC_CELLS)[name]() as cell:
             cell.simulator.answer_s = answer_ms / 1000
             yield cell
     finally:

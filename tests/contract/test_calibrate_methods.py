@@ -139,7 +139,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
     ("kind", "words", "which"),
     [
         ("epson", ("beams", "--station", "BEAMS-02", "--repeats", "3"), "Crossing"),
-        ("plc", ("z-touch", "--station", "PLATE", "--speeds", "2,1,2,1,2,1,2"), "Touch"),
+        ("plc", ("z-touch", "--station", "PLATE", "--speeds", "4,2,4,2,4,2,4"), "Touch"),
     ],
 )
 def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaking(

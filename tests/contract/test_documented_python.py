@@ -424,7 +424,7 @@ def test_the_test_of_an_integrator_s_program_passes_and_sees_a_changed_line(pyte
 def test_the_tests_of_the_pages_pass_in_somebody_else_s_run(pytester):
     blocks = [f"testing.md {number}" for number in range(1, 6)]
     pytester.makepyfile("".join(BLOCKS[name] for name in blocks))
-    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--strict-markers")
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider", "--strict-markers")
     result.assert_outcomes(passed=7)
 
 
@@ -450,4 +450,4 @@ def test_the_test_of_a_recording_passes_and_sees_a_difference(pytester):
         """
     )
     pytester.makepyfile(recorded + BLOCKS["controllers.md 1"])
-    pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
+    pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)

@@ -1,4 +1,4 @@
-"""The fixtures of the pytest plugin do not touch the tester's own journal."""
+"""The pytest plugin in third-party tests, which do not touch the tester's own journal."""
 
 import pytest
 
@@ -7,7 +7,33 @@ from robolink import ToolOffset
 
 pytest_plugins = ["pytester"]
 
-THEIRS = """
+SERVED = """
+import re
+import socket
+
+def test_the_served_one_answers(epson_tcp):
+    host, port = epson_tcp.url.removeprefix("epson+tcp://").split(":")
+    with socket.create_connection((host, int(port)), timeout=5) as client:
+        client.sendall(b"$Login,\\r\\n")
+        assert client.recv(100) == b"#Login,0\\r\\n"
+    assert epson_tcp.simulator.seed == 7
+    assert re.fullmatch(r"assist\\+tcp://[\\w-]{22}@127\\.0\\.0\\.1:\\d+", epson_tcp.assist)
+
+def test_the_one_in_process_has_a_url(epson_sim):
+    from robolink.transport import open_transport
+    open_transport(epson_sim.url).close()
+    assert epson_sim.simulator.seed == 7
+
+def test_a_crash_leaves_its_marker_to_nobody(epson_tcp, robolink_state):
+    import robolink
+    from robolink.model import Marker, MarkerKind
+    controller = robolink.connect(epson_tcp.url)
+    controller.outcomes.begin(Marker("a", MarkerKind.SET, "TLSet 1", "then"))
+    controller.close()
+    assert (robolink_state / "journal.db").exists()
+"""
+
+CUT = """
 import pytest
 import robolink
 from robolink import ToolOffset
@@ -60,20 +86,20 @@ def own_folder(tmp_path, monkeypatch):
 
 
 def contents(folder):
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
 
 
-def test_a_write_that_is_cut_leaves_nothing_in_the_tester_s_own_folder(
+def test_served_simulators_have_the_seed_and_leave_nothing_in_the_tester_s_own_folder(
     pytester, own_folder, monkeypatch
 ):
     own_folder.mkdir()
     (own_folder / "journal.db").write_bytes(b"precious")
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(own_folder / "journal.db"))
     before = contents(own_folder)
-    pytester.makepyfile(THEIRS)
+    pytester.makepyfile(test_served=SERVED, test_cut=CUT)
     # It runs in its own process: the environment when the plugin was loaded is the tester's.
-    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
-    result.assert_outcomes(passed=3)
+    words = ("-p", "no:cacheprovider", "-W", "error", "--robolink-seed", "7")
+    pytester.runpytest_subprocess(*words).assert_outcomes(passed=6)
     assert contents(own_folder) == before
 
 

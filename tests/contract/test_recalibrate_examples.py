@@ -64,7 +64,9 @@ def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, examp
     assert (robot_s < took_s - 1.0) is (example != "needle-beams")
     document = json.loads(shown.out)
     assert document["took_s"] == pytest.approx(took_s, abs=0.2)
-    assert asked - 40 < document["exchanges"] < asked  # without connecting and logging out
+    # Without connecting, logging out, and what is asked before the first run: how fast the robot
+    # is, and whether it can make the turn test.
+    assert asked - 60 < document["exchanges"] < asked
     poses = load_recipe(EXAMPLES / f"{example}.toml").recipe.poses
     stands = cell.simulator.machine.arm.flange()
     if poses.safe is not None:

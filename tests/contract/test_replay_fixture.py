@@ -44,8 +44,7 @@ def recorded(pytester, monkeypatch):
 
 def test_a_replay_fails_the_test_that_asks_otherwise(recorded):
     recorded.makepyfile(TESTS)
-    # All in one run: an interpreter for each would cost more than all of them.
-    result = recorded.runpytest_subprocess("-p", "no:cacheprovider")
+    result = recorded.runpytest_inprocess("-p", "no:cacheprovider")
     result.assert_outcomes(passed=4, errors=3)
     *_, shown = result.stdout.str().partition("= ERRORS =")
     _, more, less, nothing = shown.split("ERROR at teardown of test_")

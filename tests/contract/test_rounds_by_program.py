@@ -101,7 +101,9 @@ def test_a_round_by_the_program_finds_what_robolink_finds(cells):
     program, driver = cells(), cells()
     before = program.tool
     code, report = by_driver(driver)
+    began_ns = program.simulator.now_ns
     assert (by_program(program), code) == ("", "")
+    assert program.simulator.now_ns - began_ns < 11.8e9
     assert program.tool != before
     assert program.error_mm < 0.01
     assert math.dist(program.tool.components()[:2], driver.tool.components()[:2]) < 0.01
@@ -217,6 +219,44 @@ def test_a_round_is_driven_in_low_power_and_leaves_production_as_it_was(tmp_path
     assert cell.run() == ["kept", "1", "50", "30", "200", "100", "2"]
     assert set(moved) == {None, (False, 1)}
     cell.close()
+
+
+def test_every_search_has_the_speed_that_its_line_tells(cells):
+    """The speed of travel, in which the tip goes from side to side, would shift every edge."""
+    cell = cells()
+    searched: set[float] = set()
+    travelled: set[float] = set()
+    machine = cell.simulator.machine
+
+    def note(_task, file, _number, text):
+        if file == "recal.prg" and text.lstrip().startswith("Move "):
+            speeds = searched if "Till" in text else travelled
+            speeds.add(machine.parameters.speed_s[0])
+
+    cell.runner.on_statement = note
+    assert by_program(cell) == ""
+    assert (searched, travelled) == ({8.0}, {60.0})
+    assert {decode_line(line).fields[4] for line in rounds(cell)} == {"8000"}
+
+
+@pytest.mark.parametrize("side", [1, 3])
+def test_a_speed_that_another_program_set_between_two_sides_tells_no_round(cells, side):
+    """What was read before the first side no longer says how the others are crossed."""
+    cell, begun, searched = cells(), [], []
+    old, machine = cell.tool, cell.simulator.machine
+
+    def interfere(_task, file, _number, text):
+        if file == "recal.prg" and "before = Sw(bit)" in text:
+            begun.append(text)
+        if len(begun) == side and "place3$ = RlPlace$" in text:
+            machine.parameters.speed_s = (30.0,) * 3
+        searched.append("Till Sw(bit)" in text)
+
+    cell.runner.on_statement = interfere
+    assert by_program(cell) == "not_ready"
+    assert rounds(cell) == []
+    assert cell.tool.rounded(3) == old.rounded(3)
+    assert sum(searched) == 2 * side, "nothing is searched at that speed"
 
 
 def in_a_local(cell):
@@ -355,7 +395,8 @@ def test_a_round_whose_line_is_lost_is_not_driven_again(cells, number, fault):
     old = cell.tool
     cell.runner.on_statement = lambda _t, _f, _n, text: driven.append(text)
     assert by_program(cell) != ""
-    assert sum("SpeedS" in text and text.endswith(" 8") for text in driven) == number
+    # Set before each of the four sides of a round.
+    assert sum("SpeedS" in text and text.endswith(" 8") for text in driven) == 4 * number
     assert len(rounds(cell)) == number
     assert cell.tool.rounded(3) == old.rounded(3)
     flange = cell.simulator.machine.arm.flange()

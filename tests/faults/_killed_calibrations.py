@@ -32,13 +32,13 @@ class Dealt:
     The sample has both moments of a write, and one of each other exchange.
 
     Args:
-        share: Its number, from 0.
+        share: Its number, from 0, or several.
         shares: The number of shares.
         every_commit: One in so many durable transactions of the journal is in the sample, with the
             instants before and after it; 0 for none.
     """
 
-    def __init__(self, share: int, shares: int, *, every_commit: int = 0) -> None:
+    def __init__(self, *share: int, shares: int, every_commit: int = 0) -> None:
         self._share, self._shares = share, shares
         self._every_commit = every_commit
         self._moves = 0
@@ -49,7 +49,7 @@ class Dealt:
         if at.kind not in ("request", "answer", "commit") or not self._in_sample(at):
             return False
         self._chosen += 1
-        return self._chosen % self._shares == self._share
+        return self._chosen % self._shares in self._share
 
     def _in_sample(self, at: Instant) -> bool:
         if EVERYTHING or _WRITES.match(at.what):

@@ -7,6 +7,7 @@ start touches it; and the next calibration finishes or undoes open changes.
 
 from collections.abc import Callable
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, exchang
 from tests.faults._worlds import Worlds
 
 _MATTERS = ("rl_flag =", "TLSet n", "JUDGE", "KEPT,", "WROTE", "RlPutBack", "RESTORED,")
+_VERDICT = "JUDGE,"
 _COMPANION = "recal.prg:"
 
 
@@ -52,14 +54,19 @@ class MortalCell:
             cell.teach(22, PROVED[1:], off_mm=1.0)
         self._old = cell.tool
         self._printed = ["touches_not_witnessed" if refused else "kept"]
+        self._begins = _VERDICT if refused else ""
         self._ends = folder / "ends"
         self._dead = pytest.MonkeyPatch()
 
-    def lose(self, gone: str, *, any_statement: bool) -> set[str]:
-        """Lose it at its instants; return how the changes ended."""
+    def lose(self, gone: str, *, everywhere: bool) -> set[str]:
+        """Lose it at its instants, or at a sample of them; return how the changes ended.
+
+        Until its verdict, a change that is refused is like one that is kept; the sample leaves its
+        statements before that out. Of the PC's transactions it has both moments in turn.
+        """
         power = gone == "power"
         worlds = Worlds(
-            Statements(any_statement) if power else lambda at: at.kind == "commit",
+            Statements(everywhere, self._begins) if power else partial(_is_of_pc, everywhere),
             self._cut_power if power else self._end_pc,
         )
         printed = worlds.explore_ends(lambda: self._run(worlds), self._check)
@@ -119,13 +126,25 @@ class MortalCell:
         assert cell.journal.verify().problems == ()
 
 
-class Statements:
-    """Chooses the significant statements of the companion, or all, each when first reached."""
+def _is_of_pc(everywhere: bool, at: Instant) -> bool:
+    """Whether a PC is gone at an instant: the first before it stores, the second after it, ..."""
+    return at.kind == "commit" and (everywhere or EVERYTHING or at.number % 4 in (0, 1))
 
-    def __init__(self, any_statement: bool) -> None:
+
+class Statements:
+    """Chooses the significant statements of the companion, or all, each when first reached.
+
+    Args:
+        everywhere: Whether to choose all.
+        begins: Without it, none before one with this text.
+    """
+
+    def __init__(self, everywhere: bool, begins: str = "") -> None:
+        everywhere = everywhere or EVERYTHING
         self._chosen: Callable[[str], bool] = (
-            bool if any_statement or EVERYTHING else lambda text: any(w in text for w in _MATTERS)
+            bool if everywhere else lambda text: any(w in text for w in _MATTERS)
         )
+        self._begins = "" if everywhere else begins
         self._seen = set[str]()
 
     def __call__(self, at: Instant) -> bool:
@@ -134,4 +153,6 @@ class Statements:
         if at.kind != "statement" or not place.startswith(_COMPANION) or place in self._seen:
             return False
         self._seen.add(place)
-        return self._chosen(text.strip())
+        if self._begins in text:
+            self._begins = ""
+        return not self._begins and self._chosen(text.strip())

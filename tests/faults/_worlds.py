@@ -9,6 +9,7 @@ If the program is killed nothing of it goes on, not even to clean up: its connec
 process has ended as far as the system shows, and the controller carries out what it has received.
 """
 
+import gc
 import os
 import traceback
 from collections import Counter
@@ -46,12 +47,12 @@ class Worlds(Instants):
         told: The faults found in those worlds, with their instants.
 
     Args:
-        comes: Whether to disturb an instant.
+        comes: How many worlds to disturb at an instant.
         happens: The disturbance; without it the program is killed, at an exchange or at a commit.
     """
 
     def __init__(
-        self, comes: Callable[[Instant], bool], happens: Callable[[Instant], None] | None = None
+        self, comes: Callable[[Instant], int], happens: Callable[[Instant], None] | None = None
     ) -> None:
         super().__init__()
         self.came_at: list[Instant] = []
@@ -75,7 +76,7 @@ class Worlds(Instants):
             super().pass_by(kind, what)
             at = self.passed[-1]
             self._asked[f"{kind} {what}"] += 1
-            if self._comes(at) and self._fork():
+            if any(self._fork() for _ in range(self._comes(at))):
                 self._dead = self._happens is None
                 if self._happens is not None:
                     self._happens(at)
@@ -153,6 +154,7 @@ class Worlds(Instants):
                 self.told.append(f"at {at.kind} {nth} of {at.what}: {said or status}")
             return False
         os.close(reading)
+        gc.disable()  # it would look at, and so copy, all that this short world shares
         self._tells_to = writing
         return True
 

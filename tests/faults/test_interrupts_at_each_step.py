@@ -151,22 +151,24 @@ SHARES = 8
 """The instants are dealt to this many tests, so that several workers can share them."""
 EACH_TIME = (1, 3, 5, 6)
 """The shares of each run of the tests, with the write, both selections, login and logout among
-them; the others run only in ``make soak``.
+them, all in one run of the command; the others run only in ``make soak``.
 """
+OTHERS = [(share,) for share in range(SHARES) if EVERYTHING or share not in EACH_TIME]
 
 
 @pytest.mark.fault("F24")
 @pytest.mark.parametrize(
-    "share",
-    [
-        pytest.param(share, marks=() if EVERYTHING or share in EACH_TIME else pytest.mark.soak)
-        for share in range(SHARES)
-    ],
+    "shares",
+    OTHERS
+    if EVERYTHING
+    else [EACH_TIME, *(pytest.param(other, marks=pytest.mark.soak) for other in OTHERS)],
+    ids=str,
 )
-def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(last_pose, share):
+def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(last_pose, shares):
     cell = EpsonRecipeCell((1,))
     ending = Ending(cell)
-    worlds = Worlds(calibrations.Dealt(share, SHARES, every_commit=EVERY_COMMIT), ending)
+    dealt = calibrations.Dealt(*shares, shares=SHARES, every_commit=EVERY_COMMIT)
+    worlds = Worlds(dealt, ending)
     ended = worlds.explore_ends(
         lambda: cell.run(*calibrations.words(cell), "--json", instants=worlds),
         lambda ended: ending.check(ended, last_pose),

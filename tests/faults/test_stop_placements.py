@@ -112,7 +112,11 @@ def placements(tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    # Two tools take every step that one takes.
+    [pytest.param(name, marks=pytest.mark.soak if "one tool" in name else ()) for name in CASES],
+)
 def test_after_a_stop_nothing_goes_on(tmp_path, placements, name):
     whole = placements(name)
     everything = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"

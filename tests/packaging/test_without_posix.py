@@ -78,57 +78,66 @@ LEFT_OUT = (
 )
 
 
-def run(program, *arguments, **variables):
-    return subprocess.run(
-        [sys.executable, "-c", PROGRAM + program, *arguments],
-        cwd=ROOT,
-        env={
-            **{name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")},
-            "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
-            **variables,
-        },
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=110,
-        check=False,
-    )
+AFTERWARDS = """
+import pytest
+print("tests:", int(pytest.main(sys.argv[1:])))
+
+import robolink.controllers, robolink_simulators.hosting.streams.epson
+from robolink_cli.main import run
+assert not hasattr(select, "poll") and not hasattr(socket, "MSG_DONTWAIT")
+try:
+    import termios
+except ModuleNotFoundError as error:
+    print("lacking:", error)
+
+print("the demonstration")
+print("demonstration:", run(["demo", "--speed", "20"]))
+"""
 
 
-def test_the_platform_really_lacks_them():
-    done = run(
-        "import select, socket\n"
-        "import robolink.controllers, robolink_cli.main\n"
-        "import robolink_simulators.hosting.streams.epson\n"
-        "assert not hasattr(select, 'poll') and not hasattr(socket, 'MSG_DONTWAIT')\n"
-        "import termios\n"
-    )
-    assert done.stderr.endswith("ModuleNotFoundError: No module named 'termios'\n"), done.stderr
-
-
-def test_the_demonstration_runs_without_posix_and_without_any_but_ascii_characters():
-    done = run(
-        "from robolink_cli.main import run\nsys.exit(run(['demo', '--speed', '20']))\n",
-        PYTHONIOENCODING="ascii",
-    )
-    assert done.returncode == 0, done.stderr
-    assert "Turn test passed" in done.stdout
-    assert (done.stdout + done.stderr).isascii()
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(120)
-def test_transport_safety_record_driver_and_command_line_work_without_posix():
-    done = run(
-        "import pytest\nsys.exit(pytest.main(sys.argv[1:]))\n",
+@pytest.fixture(scope="module")
+def said():
+    """What one such Python says of the tests, of what it lacks, and in the demonstration."""
+    chosen = (
         *("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:hypothesispytest"),
         "--timeout-method=thread",
         *(f"--deselect={test}" for test in LEFT_OUT),
         *CHOSEN,
     )
-    assert done.returncode == 0, done.stdout[-5000:] + done.stderr
-    (passed,) = re.findall(r"(\d+) passed", done.stdout)
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM + AFTERWARDS, *chosen],
+        cwd=ROOT,
+        env={
+            **{name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")},
+            "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+            "PYTHONIOENCODING": "ascii",
+        },
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=110,
+        check=False,
+    ).stdout
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_transport_safety_record_driver_and_command_line_work_without_posix(said):
+    assert "\ntests: 0\n" in said, said[-5000:]
+    (passed,) = re.findall(r"(\d+) passed", said)
     assert int(passed) > 200
+
+
+def test_the_platform_really_lacks_them(said):
+    assert "\nlacking: No module named 'termios'\n" in said, said[-5000:]
+
+
+def test_the_demonstration_runs_without_posix_and_without_any_but_ascii_characters(said):
+    _, _, demonstration = said.partition("\nthe demonstration\n")
+    assert demonstration.endswith("\ndemonstration: 0\n"), said[-5000:]
+    assert "Turn test passed" in demonstration
+    assert demonstration.isascii()
 
 
 # The tests that run under Windows' Python have the files that every test reads.

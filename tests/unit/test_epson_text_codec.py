@@ -74,13 +74,13 @@ def test_a_status_that_makes_no_sense_is_refused(reply):
         parse_status(reply)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(FLAGS, st.integers(0, 9999))
 def test_eleven_digits_come_back_as_the_same_flags(flags, code):
     assert parse_status(Reply("GetStatus", status_fields(flags, code))) == (flags, code)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(FLAGS, st.integers(0, 9999))
 def test_ten_digits_lose_only_the_test_flag(flags, code):
     word, digits = status_fields(flags, code, 10)
@@ -387,7 +387,7 @@ def received(role: Role, parts: list[bytes]) -> list[Event]:
     return events
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.data(), st.lists(requests(), max_size=6), TERMINATORS)
 def test_any_requests_cut_in_any_way_arrive_as_they_were_sent(data, sent, terminator):
     host = EpsonTextCodec(Role.HOST, terminator=terminator)
@@ -396,7 +396,7 @@ def test_any_requests_cut_in_any_way_arrive_as_they_were_sent(data, sent, termin
 
 
 @pytest.mark.fault("F05", "F06")
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.data(), st.lists(ANSWERS, max_size=6), TERMINATORS)
 def test_any_answers_cut_in_any_way_arrive_as_they_were_sent(data, sent, terminator):
     device = EpsonTextCodec(Role.DEVICE, terminator=terminator)
@@ -404,7 +404,7 @@ def test_any_answers_cut_in_any_way_arrive_as_they_were_sent(data, sent, termina
     assert received(Role.HOST, data.draw(chunks(stream))) == [*sent, EndOfStream()]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(NAMES, TEXTS, st.sampled_from(["\r\n", "\r", "\n"]))
 def test_one_line_end_before_the_closing_quote_is_taken_off(name, text, line_end):
     if text.endswith('"'):
@@ -436,7 +436,7 @@ def outcome(role: Role, parts: list[bytes]) -> tuple[list[Event], bool]:
     return events, False
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.data(), NOISE, st.sampled_from(Role))
 def test_noise_raises_nothing_else_and_reads_the_same_however_it_is_cut(data, noise, role):
     whole = outcome(role, [noise] if noise else [])
@@ -444,7 +444,7 @@ def test_noise_raises_nothing_else_and_reads_the_same_however_it_is_cut(data, no
     assert outcome(role, [bytes([byte]) for byte in noise]) == whole
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.binary(max_size=60))
 def test_a_device_can_answer_whatever_it_is_sent(noise):
     device, host = EpsonTextCodec(Role.DEVICE), EpsonTextCodec(Role.HOST)

@@ -260,7 +260,7 @@ def tamper(journal, statement):
         tables.connection.run(statement)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(APPENDS)
 def test_any_sequence_of_entries_verifies_and_comes_back_as_it_was_given(appends):
     journal = fresh()
@@ -278,7 +278,7 @@ def test_any_sequence_of_entries_verifies_and_comes_back_as_it_was_given(appends
     journal.close()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     number=st.integers(1, 5),
     column=st.sampled_from([name for name in COLUMNS if name != "number"]),
@@ -370,3 +370,18 @@ def test_details_that_are_no_plain_json_are_refused_and_leave_nothing(value):
     assert journal.verify().checked == 1
     log.append(NewEntry(EntryKind.RAW))
     assert journal.verify() == ChainVerification(2, ())
+
+
+@pytest.mark.parametrize(
+    ("given", "read"),
+    [
+        ({9: 1, 10: 2, 100: 3}, {"9": 1, "10": 2, "100": 3}),
+        ({"of": {2.5: "b", 10: "a"}}, {"of": {"2.5": "b", "10": "a"}}),
+        ({"at": (1.0, -0.0)}, {"at": [1.0, -0.0]}),
+        ({"at": [0.1, 1e22], "on": True}, {"at": [0.1, 1e22], "on": True}),
+    ],
+)
+def test_a_marker_is_whole_however_its_details_were_given(log, given, read):
+    log.begin(Marker("a", MarkerKind.MOVE, "Move", "2025-01-01T00:00:00+00:00", given))
+    (found,) = log.open_markers()
+    assert json.dumps(found.details, sort_keys=True) == json.dumps(read, sort_keys=True)

@@ -319,4 +319,4 @@ def test_links_that_are_opened_in_blocks_one_within_the_other_tell_all():
             link = robolink.transport.open_transport("epson+sim://log-nested")
     link.send(b"$GetStatus\r\n", deadline=Deadline.after(link.clock, 1))
     link.close()
-    assert len(inner) == len(outer) == around.links == 1
+    assert len(inner) == len(outer) == len(around.links) == 1

@@ -70,7 +70,7 @@ def fault_of(decode, words):
 
 
 @given(WORDS)
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=25)
 def test_the_checksum_is_the_one_of_modbus_rtu(words):
     data = b"".join(word.to_bytes(2, "little") for word in words)
     swapped = FramerRTU.compute_CRC(data)  # as sent: low byte first
@@ -149,7 +149,7 @@ def test_f28_f32_a_torn_command_is_refused(cut):
 
 @pytest.mark.fault("F31")
 @given(st.integers(1, 111), st.tuples(*[st.floats(-500, 500)] * 6), st.integers(1, 65535))
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=40)
 def test_a_torn_snapshot_is_refused_or_is_one_of_the_two(cut, tcp, ack):
     old = encode_response(SNAPSHOT)
     new = encode_response(Response(ack_head=ack, tcp=tcp, plc_heartbeat=1))
@@ -338,7 +338,7 @@ def test_counters_leave_zero_out(number, following):
 
 
 @given(st.integers(0, 0xFFFF), st.integers(0, 2000))
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=25)
 def test_a_heartbeat_says_whose_it_is_and_always_changes(epoch, count):
     word, following = heartbeat_word(epoch, count), heartbeat_word(epoch, count + 1)
     assert word != following

@@ -195,7 +195,7 @@ def zyz_matrix(angles_deg):
 
 @pytest.mark.fault("F40")
 @given(COORDINATES)
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=80)
 @example((0.0, 0.0, 0.0, 40.0, 180.0, 180.0))
 @example((0.0, 0.0, 0.0, 40.0, 0.0, 180.0))
 def test_f40_the_plc_gets_the_same_rotation(coordinates):
@@ -205,7 +205,7 @@ def test_f40_the_plc_gets_the_same_rotation(coordinates):
 
 
 @given(COORDINATES)
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=80)
 @example((0.0, 0.0, 0.0, 40.0, 90.0, 30.0))
 def test_the_rotation_of_the_plc_is_read_right(frame):
     coordinates = from_frame(frame, unit_um=1000.0)
@@ -214,7 +214,7 @@ def test_the_rotation_of_the_plc_is_read_right(frame):
 
 
 @given(COORDINATES, UNITS)
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=40)
 def test_there_and_back_is_the_same_tool(coordinates, unit_um):
     back = from_frame(to_frame(coordinates, unit_um=unit_um), unit_um=unit_um)
     assert back[:3] == pytest.approx(coordinates[:3], rel=1e-12, abs=1e-12)
@@ -222,7 +222,7 @@ def test_there_and_back_is_the_same_tool(coordinates, unit_um):
 
 
 @given(st.floats(-180, 180, exclude_min=True))
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=25)
 def test_a_turn_about_the_flange_stands_in_a_alone(u_deg):
     frame = to_frame(ToolOffset(1, 2, 3, u_deg).components(), unit_um=1000.0)
     assert frame[3] == pytest.approx(u_deg, abs=1e-12)

@@ -44,7 +44,7 @@ def rtu(payload, unit=5):
 
 
 @pytest.mark.fault("F05")
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(words=WORDS, cuts=st.lists(st.integers(1, 260), max_size=5), serial=st.booleans())
 def test_an_answer_in_any_pieces_is_the_answer(words, cuts, serial):
     framing = RtuFraming() if serial else TcpFraming()
@@ -62,7 +62,7 @@ def test_an_answer_in_any_pieces_is_the_answer(words, cuts, serial):
 
 
 @pytest.mark.fault("F07")
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     words=st.lists(st.integers(0, 0xFFFF), min_size=3, max_size=3),
     place=st.integers(0, 10),
@@ -76,7 +76,7 @@ def test_a_damaged_byte_on_a_serial_line_never_gives_another_value(words, place,
 
 
 @pytest.mark.fault("F08")
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(words=st.lists(st.integers(0, 0xFFFF), min_size=3, max_size=3), place=st.integers(0, 9))
 def test_f08_swapped_neighbours_on_a_serial_line_never_give_another_value(words, place):
     frame = bytearray(rtu(read_answer(words)))
@@ -211,7 +211,7 @@ def payload_by_pymodbus(request):
     return bytes([pdu.function_code]) + pdu.encode()
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(request=REQUESTS, transaction=st.integers(1, 0xFFFF))
 def test_a_request_has_the_bytes_that_pymodbus_sends(request, transaction):
     payload = payload_by_pymodbus(request)
@@ -263,7 +263,7 @@ def told(reply):
     return reply.function, reply.refusal, reply.values, reply.address, reply.count
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(payload=PAYLOADS)
 def test_a_whole_answer_says_what_pymodbus_reads_in_it(payload):
     for reply in (taken(TcpFraming(), tcp(payload, 77)), taken(RtuFraming(), rtu(payload))):
@@ -275,7 +275,7 @@ def test_a_whole_answer_says_what_pymodbus_reads_in_it(payload):
 CUT_BY_CHANCE = bytes.fromhex("031eb5143dfcd817c99c8d7d1ef24772d706390e1ca9c4f66268a5eeacb3b4eb6c")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @example(payload=CUT_BY_CHANCE, place=0, flip=1, cut=0, more=b"")
 @given(
     payload=PAYLOADS,

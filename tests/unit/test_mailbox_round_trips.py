@@ -81,7 +81,7 @@ RESPONSES = st.builds(
 
 
 @given(COMMANDS, UINT)
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=40)
 def test_a_plc_reads_the_command_that_was_sent(command, heartbeat):
     words = encode_command(command, heartbeat=heartbeat)
     assert (len(words), words[62]) == (64, heartbeat)
@@ -89,7 +89,7 @@ def test_a_plc_reads_the_command_that_was_sent(command, heartbeat):
 
 
 @given(RESPONSES)
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=40)
 def test_a_client_reads_the_snapshot_that_was_published(response):
     words = encode_response(response)
     assert len(words) == 112
@@ -97,7 +97,7 @@ def test_a_client_reads_the_snapshot_that_was_published(response):
 
 
 @given(st.builds(Slot, counter=UINT, defined=st.booleans(), tool=SIX, name=NAME))
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=25)
 def test_a_client_reads_the_slot_that_was_published(slot):
     words = encode_slot(slot)
     assert len(words) == 36
@@ -127,7 +127,7 @@ def test_what_is_not_finite_reaches_the_plc_to_be_refused_there():
 
 
 @given(st.lists(UINT, min_size=24, max_size=24))
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=25)
 def test_no_answer_loses_a_bit_on_its_way(words):
     answer = Answer(tuple(words))
     assert decode_response(encode_response(Response(answer=answer))).answer == answer

@@ -45,12 +45,13 @@ def looked_at():
         source = path.read_text(encoding="utf-8")
         if CALLED.search(source):
             tree = ast.parse(source)
-            found.append((path, list(sentences(tree)), list(too_early(tree))))
+            nodes = list(ast.walk(tree))
+            found.append((path, list(sentences(nodes)), list(too_early(tree, nodes))))
     return found
 
 
-def sentences(tree):
-    for node in ast.walk(tree):
+def sentences(nodes):
+    for node in nodes:
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "declared"):
             yield node
 
@@ -68,11 +69,11 @@ def when_imported(top):
             waiting += ast.iter_child_nodes(node)
 
 
-def too_early(tree):
+def too_early(tree, nodes):
     """Yield the calls of ``tr`` at import, and those whose text click keeps."""
     kept = (
         node.value
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.keyword) and node.arg in ("help", "short_help", "epilog")
     )
     for node in (*when_imported(tree), *kept):
@@ -136,7 +137,8 @@ def test_what_would_be_translated_too_early_is_found():
         'A = tr("a")\nclass B:\n    c = {1: tr("c")}\n@option(help=tr("d"))\ndef f(x=tr("x")):\n'
         '    g = option(help=tr("g"))\n    return tr("no")\n'
     )
-    assert sorted(set(too_early(ast.parse(source)))) == [1, 3, 4, 5, 6]
+    tree = ast.parse(source)
+    assert sorted(set(too_early(tree, ast.walk(tree)))) == [1, 3, 4, 5, 6]
 
 
 # A sentence of the library names the next step in the words of the program that shows it.

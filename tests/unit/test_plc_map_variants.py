@@ -160,7 +160,7 @@ def test_the_words_of_a_probe_are_those_of_a_codesys_plc():
 
 @pytest.mark.fault("F36")
 @given(numbers, st.floats(-30, 30))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_what_is_encoded_reads_back_within_its_slack_and_stays_there(number, value):
     if number.type in (NumberType.UINT16, NumberType.UINT32) and value / number.factor < 0:
         value = -value
@@ -174,7 +174,7 @@ def test_what_is_encoded_reads_back_within_its_slack_and_stays_there(number, val
 
 
 @given(numbers, st.floats(-30, 30))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_pymodbus_puts_the_same_words_there(number, value):
     if number.type.whole:
         value = abs(round(value)) * number.factor

@@ -369,7 +369,7 @@ VALUES = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_whatever_stands_in_a_place_is_accepted_or_told(data):
     document = copy.deepcopy(data.draw(st.sampled_from(DOCUMENTS)))

@@ -30,7 +30,7 @@ dialogues = st.builds(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.lists(dialogues, min_size=1, max_size=3))
 def test_what_is_written_is_read_back(made):
     text = "".join(format_dialogue(dialogue) for dialogue in made)

@@ -1,12 +1,14 @@
 """Commands of a simulated EPSON controller: preconditions, effects, codes, the command window."""
 
 import json
+from dataclasses import fields
 
 import pytest
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator, Mode
 
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset
+from robolink.protocols.epson_text import COMMANDS, StatusFlags
 
 # Every command but Execute: preconditions, effects, codes.
 
@@ -84,6 +86,11 @@ def test_what_needs_ready_is_refused_with_20_while_a_task_runs(client, request_)
     name = request_[1:].partition(",")[0]
     assert client.ask(request_) == f"!{name},20"
     assert client.flags() == RUNNING
+
+
+def test_the_flags_that_commands_need_or_forbid_are_flags():
+    known = {flag.name for flag in fields(StatusFlags)}
+    assert all(command.needs | command.forbids <= known for command in COMMANDS)
 
 
 @pytest.mark.parametrize("act", ["press_estop", "open_guard"])

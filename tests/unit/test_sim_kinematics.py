@@ -74,7 +74,7 @@ offsets = st.builds(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(placements())
 def test_the_inverse_finds_the_joints_that_the_forward_kinematics_came_from(placement):
     model, joints = placement
@@ -82,7 +82,7 @@ def test_the_inverse_finds_the_joints_that_the_forward_kinematics_came_from(plac
     assert found == pytest.approx(joints, abs=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(placements(), st.sampled_from(Hand))
 def test_both_hands_bring_the_flange_to_the_same_pose(placement, hand):
     model, joints = placement
@@ -92,7 +92,7 @@ def test_both_hands_bring_the_flange_to_the_same_pose(placement, hand):
     assert forward(model, found).coordinates() == pytest.approx(pose.coordinates(), abs=1e-6)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(placements(), offsets)
 def test_the_flange_is_found_again_from_the_tip(placement, offset):
     model, joints = placement

@@ -342,7 +342,7 @@ def samples(profile, count=60):
     return [profile.share_at(profile.duration_s * step / count) for step in range(count + 1)]
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(paces, st.floats(0, 0.99))
 def test_a_profile_goes_from_its_start_to_the_end_within_its_limits(pace, start):
     profile = SpeedProfile.fastest(start, pace)
@@ -355,7 +355,7 @@ def test_a_profile_goes_from_its_start_to_the_end_within_its_limits(pace, start)
     assert profile.rate_at(profile.falls_after_s) <= pace.rate_per_s * (1 + 1e-9)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(paces, st.floats(0.001, 0.999), rates)
 def test_a_braked_profile_keeps_its_past_and_comes_to_rest_on_the_path(pace, part, fall):
     profile = SpeedProfile.fastest(0.0, pace)

@@ -213,7 +213,7 @@ def test_without_a_tilt_a_and_c_are_one_turn_and_a_carries_it():
     assert zyz_angles(zyz(30, 0, 50)) == pytest.approx((80, 0, 0))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(angles, angles, angles)
 def test_angles_read_from_a_rotation_give_it_back(a_deg, b_deg, c_deg):
     rotation = zyz(a_deg, b_deg, c_deg)
@@ -221,7 +221,7 @@ def test_angles_read_from_a_rotation_give_it_back(a_deg, b_deg, c_deg):
     assert list(zyx(*zyx_angles(rotation))) == near(rotation)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(angles, angles, angles)
 def test_axis_and_angle_of_a_rotation_give_it_back(a_deg, b_deg, c_deg):
     rotation = zyz(a_deg, b_deg, c_deg)
@@ -237,7 +237,7 @@ def test_half_a_turn_has_an_axis_too(half_turn):
     assert list(about(axis, angle_deg)) == near(half_turn)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(frames, frames)
 def test_a_frame_seen_from_another_and_put_back_is_itself(a, b):
     back = a @ (a.inverse() @ b)
@@ -245,7 +245,7 @@ def test_a_frame_seen_from_another_and_put_back_is_itself(a, b):
     assert list(back.rotation) == near(b.rotation)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.floats(-179, 179))
 def test_the_closest_turn_of_a_turn_about_z_is_itself(c_deg):
     assert yaw_deg(about_z(c_deg)) == pytest.approx(c_deg)

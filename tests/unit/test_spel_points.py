@@ -87,7 +87,7 @@ def test_anything_else_is_no_point(text):
     assert caught.value.raw == text.encode()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(POINTS, st.sampled_from([9, 8]))
 def test_a_point_reads_back_as_it_was_written(point, width):
     if len(point.coordinates) == 6:
@@ -202,7 +202,7 @@ def test_anything_else_is_no_point_file(tmp_path, text):
 
 
 @given(st.text(max_size=200) | st.text("Point1 {}\n=nr0NXYZU", max_size=200))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_rubbish_gives_points_or_a_sentence(text):
     try:
         parse_pts(text)

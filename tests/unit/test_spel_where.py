@@ -46,7 +46,7 @@ def test_the_value_columns_are_where_a_client_in_the_field_reads_them():
     assert pulse == "PULSE:  1:    27306 pls 2:  -207076 pls 3:  -227556 pls 4:    24507 pls"
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(positions(), st.sampled_from([9, 8]), st.sampled_from([(3,), ()]))
 def test_a_position_reads_back_as_it_was_written(where, width, linear):
     assert parse_where(format_where(where, width=width, linear_joints=linear)) == where
@@ -164,13 +164,13 @@ def test_a_line_that_cannot_be_read_is_an_error(text):
     assert caught.value.raw == text.encode()
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.dictionaries(NUMBERS, TILTED, max_size=5), st.sampled_from(["plain", "padded"]))
 def test_a_listing_of_six_values_reads_back_as_it_was_written(tools, layout):
     assert parse_tool_listing(format_tool_listing(tools, layout=layout)) == tools
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.dictionaries(NUMBERS, FLAT, max_size=5))
 def test_a_listing_of_four_values_reads_back_as_it_was_written(tools):
     assert parse_tool_listing(format_tool_listing(tools, layout="four")) == tools

@@ -83,7 +83,7 @@ def test_a_password_in_a_url_is_refused_and_not_repeated(text):
     assert "hunter2" not in str(caught.value)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=80)
 @given(st.text(max_size=40))
 def test_any_text_is_a_url_or_a_config_error(text):
     try:

@@ -1,7 +1,7 @@
 """The robot arm of an EPSON controller: where it is, and how to move it."""
 
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink.controllers.epson.answers import ArmState
 from robolink.controllers.epson.link import EpsonLink
@@ -31,6 +31,10 @@ from robolink.model import (
 )
 from robolink.protocols import spel
 from robolink.remedy_words import RemedyWord, remedy_word
+
+if TYPE_CHECKING:
+    from robolink.controllers.epson.arms import EpsonTimes
+    from robolink.controllers.movement_time import JointRates
 
 _PRINTED_MM: Final = 0.001
 """Last digit of a printed position, in mm: three decimals (docs/reference/spel.md 5.6)."""
@@ -117,6 +121,16 @@ class EpsonGroup(MotionGroupCore):
         begin = None if start is None else self._flagged(start)
         return singular.obstacle(self._flagged(target), path, begin)
 
+    def reaches(self, target: Pose) -> bool:
+        """Read whether the frame of the selected tool can be somewhere (TargetOK).
+
+        Args:
+            target: Where; nothing moves.
+        """
+        query = spel.print_reachable(self._flagged(target), six_axes=self._six_axes)
+        with self._link.window.proving_ready(query):
+            return spel.parse_boolean(self._link.window.printed(query))
+
     def deceleration_mm_s2(self) -> float:
         """Read AccelS, or less where the cell states it: ``Till`` brakes with it.
 
@@ -131,6 +145,18 @@ class EpsonGroup(MotionGroupCore):
         Straight movements speed up and brake with it.
         """
         return speed_mm_s**2 / (2 * min(self.settings.acceleration_mm_s2()))
+
+    def movement_times(self, stated: "JointRates | None" = None) -> "EpsonTimes":
+        """Read what tells how long movements will take.
+
+        Args:
+            stated: How fast the joints are at Speed 100 and Accel 100, by the cell file; ``None``
+                for what is known of the robot's model.
+        """
+        from robolink.controllers.epson.arms.times import read_times  # a stop does without it
+
+        accel_s = self.settings.acceleration_mm_s2()
+        return read_times(self._link, accel_s, stated)
 
     def edge_step_mm(self, speed_mm_s: float) -> float:  # noqa: ARG002 - only the printed digits matter
         """Return the last digit of a position as it is printed."""

@@ -310,6 +310,18 @@ class FactReader:
             robot_serials=serials,
         )
 
+    def model(self, robot: int) -> str | None:
+        """Return the model of one robot, ``None`` if the controller does not tell it.
+
+        Args:
+            robot: Its number, from 1.
+        """
+        models = self._per_robot("GetRobotInfo", fields_each=2)
+        if not models:
+            models = self._printed(spel.print_robot_model()) if self._execute_available() else ()
+            robot = 1
+        return models[robot - 1] if 1 <= robot <= len(models) else None
+
     def _fields(self, name: str, *parameters: str) -> tuple[str, ...] | None:
         try:
             return self._session.exchange(name, *parameters).fields
@@ -377,6 +389,10 @@ class EpsonLink(DriverLink):
         """Ask anew, at the next use, which robot is current, and whose record it is."""
         self.robot.forget()
         self.markers.outcomes.ask(self._reader.read)
+
+    def model(self) -> str | None:
+        """Read the model of the current robot, ``None`` if the controller does not tell it."""
+        return FactReader(self.session, self.window).model(self.robot.read().number)
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
         """Whether a refusal confirms that nothing was done (docs/reference/epson.md 1.6)."""

@@ -256,6 +256,8 @@ class EpsonMotionUntilInput:
             )
 
 
+_STATE: Final = (spel.print_selected_tool(), spel.print_motor(), spel.print_power())
+_LOOKED_AT: Final = (*_STATE, spel.print_speed(1), spel.print_speed_s(1))
 _ACCEL_S: Final = (spel.print_accel_s(1), spel.print_accel_s(2))
 _ALL_ACCEL_S: Final = tuple(map(spel.print_accel_s, range(1, 7)))
 
@@ -351,13 +353,7 @@ class Settings:
         """
         accel = () if self._stated_mm_s2 is None else _ACCEL_S
         tool, motor, power, percent, straight, *more = self._window.printed_numbers(
-            spel.print_selected_tool(),
-            spel.print_motor(),
-            spel.print_power(),
-            spel.print_speed(1),
-            spel.print_speed_s(1),
-            *accel,
-            *([spel.print_input(edge.number)] if edge else []),
+            *_LOOKED_AT, *accel, *([spel.print_input(edge.number)] if edge else [])
         )
         found, sensed = more[: len(accel)], more[len(accel) :]
         return ArmState(

@@ -95,6 +95,9 @@ def command_class_of(command: Command) -> CommandClass:
 REST_S: Final = 5.0
 """Longest time from the stop to a confirmed stop state, in s (docs/reference/rules.md 5)."""
 
+_CHANGE_NOTHING: Final = frozenset({Opcode.READ_INPUT, Opcode.READ_TOOL})
+"""Commands that no state has to allow."""
+
 _ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
 _LOOK_S: Final = 0.1
 _STILL: Final = 0.05
@@ -365,11 +368,13 @@ class CommandSender:
         """Return a snapshot from before a command.
 
         What ends a movement of ours on a slow line does not wait for one: whoever waited on the
-        movement has read the last one, and beats no more.
+        movement has read the last one, and beats no more. What changes nothing needs none of its
+        own where this step has read one.
         """
         if draft.only_ends and self._wire.motions.unfinished and self._wire.whole_look_s > 0:
             return self._snapshots.latest
-        return self._snapshots.take()
+        known = self._snapshots.of_this_step() if draft.opcode in _CHANGE_NOTHING else None
+        return known or self._snapshots.take()
 
     @contextmanager
     def _exchanging(self, request: str) -> Iterator[None]:

@@ -2,12 +2,16 @@
 
 import math
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
+from typing import Final
 
 from robolink.controllers.motion_group import MotionGroupCore
+from robolink.controllers.movement_time import AnswerCounts, JointRates, Way, ramped_s
 from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.commands import Require
 from robolink.controllers.softmotion.condition import (
+    is_moving,
     require_beats,
     require_enabled,
     require_permit,
@@ -15,6 +19,7 @@ from robolink.controllers.softmotion.condition import (
     require_still,
     require_tool_known,
 )
+from robolink.controllers.softmotion.facts import block_name
 from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.jog import Jog, JogWatch
 from robolink.controllers.softmotion.mailbox import Mailbox
@@ -24,6 +29,7 @@ from robolink.controllers.softmotion.movement import (
     SoftMotionMotionUntilInput,
     dynamics_of,
     run_up_mm,
+    straight,
     up_to_an_edge,
 )
 from robolink.errors import (
@@ -78,7 +84,7 @@ class SoftMotionGroup(MotionGroupCore):
 
     def pose(self) -> Pose:
         """Read where the tip of the selected tool is now."""
-        now = self._mailbox.snapshots.take()
+        now = self._just_at_rest or self._mailbox.snapshots.take()
         return self._mailbox.pose(now.tcp, tool=now.tool_slot)
 
     def axes(self) -> dict[str, tuple[float, ...]]:
@@ -156,6 +162,16 @@ class SoftMotionGroup(MotionGroupCore):
         """Return the distance of the acceleration and jerk of such a movement."""
         return run_up_mm(speed_mm_s, self._stated_mm_s2)
 
+    def movement_times(self, stated: JointRates | None = None) -> "SoftMotionTimes":
+        """Return what tells how long movements will take.
+
+        Args:
+            stated: How fast the axes are at 100 %, by the cell file; ``None`` where nobody says it.
+        """
+        now = self._mailbox.snapshots.take()
+        blocks = (block_name(now.position_kinematics), block_name(now.orientation_kinematics))
+        return SoftMotionTimes("+".join(filter(None, blocks)), stated, self._stated_mm_s2)
+
     def edge_step_mm(self, speed_mm_s: float) -> float:
         """Return how far it goes in a cycle: the PLC notes an edge once a cycle."""
         return speed_mm_s * LATCH_CYCLE_S
@@ -212,6 +228,13 @@ class SoftMotionGroup(MotionGroupCore):
         for motion in self._current:
             if not motion.settled:
                 motion.abort()
+
+    @property
+    def _just_at_rest(self) -> Response | None:
+        """The snapshot that showed the rest after our last movement, if it is the last of all."""
+        rest = self._current[-1].rest if self._current else None
+        known = self._mailbox.snapshots.of_this_step()
+        return rest if rest is known and known is not None and not is_moving(known) else None
 
     def _start(self, target: Pose, draft: Command) -> SoftMotionMotion:
         """Start a movement inside the limits; see the model."""
@@ -356,3 +379,72 @@ class SoftMotionGroup(MotionGroupCore):
                     tr("The axis group did not change its state."),
                     remedy=tr("Nothing was repeated. Look at the PLC."),
                 )
+
+
+_AXES_OF_FLANGE: Final = {
+    "Kin_Gantry3": (0, 1, 2),
+    "Kin_Gantry3+Kin_CAxis": (0, 1, 2, 3),
+    "Kin_5Axes": (0, 1, 2, 3, 4),
+}
+"""By kinematics: which coordinate of the flange each axis moves (docs/reference/softmotion.md 3.3).
+
+The inclination of Kin_5Axes moves X, Y and Z too, by its dToolLength, which the mailbox does not
+report; those axes are not the ones that take longest then."""
+
+_REPORTED_AFTER_S: Final = 0.014
+"""Time in s by which a movement is longer than its profile: a PLC begins it in its next cycle, and
+reports the end two cycles later, of 4 ms each."""
+
+_SEEN_AFTER_S: Final = 0.03
+"""The same for one whose end is not known beforehand, and is looked for less often."""
+
+
+@dataclass(frozen=True, slots=True)
+class SoftMotionTimes:
+    """Implements :class:`robolink.controllers.MovementTimes`.
+
+    Attributes:
+        kinematics: Names of its blocks.
+        rates: How fast the axes are at 100 %; ``None`` where nobody says it.
+        acceleration_mm_s2: Highest acceleration of straight movements, where the cell states one.
+    """
+
+    kinematics: str
+    rates: JointRates | None
+    acceleration_mm_s2: int | None = None
+
+    @property
+    def answers(self) -> AnswerCounts:
+        """For how many answers each is waited for: snapshots, blocks, and looks at the end."""
+        return AnswerCounts(run=30.0, tool=30.0, select=4.0, move=6.5, search=9.0)
+
+    def move_s(self, way: Way) -> float | None:
+        """Return the seconds of a movement; see :class:`robolink.controllers.MovementTimes`."""
+        if way.profile.path is Path.STRAIGHT:
+            return self._straight_s(way, up_to_edge=False)
+        moved = _AXES_OF_FLANGE.get(self.kinematics)
+        if moved is None or self.rates is None:
+            return None
+        before, after = way.start.coordinates(), way.end.coordinates()
+        deltas = [after[n] - before[n] for n in moved]
+        share = way.profile.speed_percent / 100
+        seconds = self.rates.takes_s(deltas, share, share)
+        return None if seconds is None else seconds + _SEEN_AFTER_S
+
+    def search_s(self, way: Way) -> float | None:
+        """Return those of one that an input ends, which brakes harder."""
+        return self._straight_s(way, up_to_edge=True)
+
+    def _straight_s(self, way: Way, *, up_to_edge: bool) -> float | None:
+        if not way.length_mm and way.turn_deg:
+            return None  # it is as fast as the axes
+        numbers = up_to_an_edge if up_to_edge else straight
+        speed, rise, fall, _ = numbers(
+            way.profile.speed_mm_s,
+            unit_um=_UM_PER_MM,
+            acceleration_mm_s2=self.acceleration_mm_s2,
+        )
+        return ramped_s(way.length_mm, speed, rise, fall) + _REPORTED_AFTER_S
+
+
+_UM_PER_MM: Final = 1000.0

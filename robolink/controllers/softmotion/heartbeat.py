@@ -1,5 +1,9 @@
 """Two heartbeats: whether the PLC's motion task still runs, and when ours is due.
 
+When to look for something new, above all for the end of a movement: as often as it is worth, for
+each look costs the PLC and the network an exchange. When a movement is likely to end decides that,
+and nothing else.
+
 Whose turn it is on the wire: the beat of who waits on a movement goes before everything.
 
 A link carries one exchange at a time, and on a slow serial line one read of the response block
@@ -17,7 +21,7 @@ from types import TracebackType
 from typing import Final
 
 from robolink import runtime
-from robolink.protocols.mailbox import heartbeat_word
+from robolink.protocols.mailbox import Six, heartbeat_word
 from robolink.timing import NS_PER_S
 
 FROZEN_S: Final = 1.0
@@ -100,6 +104,119 @@ class ClientHeartbeat:
     def again(self, epoch: int) -> int:
         """Return the last word once more, which is no sign of life; 0 would be an end."""
         return heartbeat_word(epoch, self._count)
+
+
+POLL_S: Final = 0.04
+"""Longest time between two looks at the head of the response block, in s."""
+
+_SHORTEST_POLL_S: Final = 0.0005
+_POLLS_PER_WAIT: Final = 4
+"""Number of looks in the time waited so far, so that the looks prolong each wait only slightly.
+
+Most commands end within one or two PLC cycles; if a look itself takes that long, the next one
+follows at once.
+"""
+
+LOOK_S: Final = 0.3
+"""Longest time between two snapshots while waiting for something, in s."""
+
+
+def poll_period_s(waited_s: float) -> float:
+    """Return the time between two looks, in s, after waiting so long."""
+    return min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
+
+
+FIRST_LOOK_S: Final = 0.05
+"""Time until the first look at a movement of which nothing is known, in s."""
+
+_LATE_S: Final = 0.008
+"""Time in s by which a PLC begins later and reports the end later: two cycles of 4 ms."""
+
+_SHORTEST_WATCH_S: Final = 0.004
+"""Shortest time from look to look at a movement, in s: nothing changes within a usual cycle."""
+
+_WATCHES_PER_WAIT: Final = 3
+"""Number of looks, behind the expected end, in the time that has passed since."""
+
+_WATCHES_UNFORESEEN: Final = 10
+"""Number of looks in the time that a movement has taken of which no end can be expected."""
+
+_MIDDLE: Final = 0.5
+_NO_WAY: Final = 1e-6
+
+
+def watch_period_s(waited_s: float) -> float:
+    """Return the time until the next look at a movement that may end at any moment, in s.
+
+    Args:
+        waited_s: How long it has taken so far.
+    """
+    return max(FIRST_LOOK_S - waited_s, min(waited_s / _WATCHES_UNFORESEEN, POLL_S))
+
+
+class ExpectedEnd:
+    """When a movement is likely to end, for how often to look; nothing else follows from it.
+
+    A straight movement takes as long as its numbers say, unless it turns far, or the machine has an
+    override. A movement that brakes as it accelerates takes twice the time to its middle. One that
+    leads nowhere takes no time.
+
+    Args:
+        start: Where its tip begins.
+        target: Where it goes.
+        now_ns: When it began.
+        takes_s: How long it takes by its numbers, 0 where they do not say.
+    """
+
+    def __init__(self, start: Six, target: Six, now_ns: int, *, takes_s: float = 0.0) -> None:
+        self._begun_ns = now_ns
+        self._start, self._target = start, target
+        self._takes_s = takes_s
+        self._known = takes_s > 0 or _apart(start, target) < _NO_WAY
+        self._before = 0.0, 0.0
+
+    def saw(self, tip: Six, now_ns: int) -> None:
+        """Learn from where the tip is now."""
+        if not all(map(math.isfinite, tip)):
+            return
+        passed_s = (now_ns - self._begun_ns) / NS_PER_S
+        gone, left = _apart(self._start, tip), _apart(tip, self._target)
+        share = gone / (gone + left) if gone + left else 0.0
+        if share < _MIDDLE:
+            self._before = passed_s, share
+            if self._takes_s < 2 * passed_s:
+                self._takes_s, self._known = 2 * passed_s, False
+        elif not self._known:
+            before_s, before = self._before
+            at_s = before_s + (passed_s - before_s) * (_MIDDLE - before) / (share - before)
+            self._takes_s, self._known = 2 * at_s, True
+
+    def patience_s(self, now_ns: int) -> float:
+        """Return the time until the next whole look, in s.
+
+        There is one when the movement is likely to end, or ends at the earliest: until its middle
+        it takes as long again as it has taken.
+        """
+        left_s = self._left_s(now_ns)
+        if not self._known:
+            left_s = max(left_s, FIRST_LOOK_S)
+        return shared_out(left_s, LOOK_S) if left_s > 0 else LOOK_S
+
+    def pause_s(self, now_ns: int) -> float:
+        """Return the time until the next look, in s; before the end a whole one will do."""
+        late_s = -self._left_s(now_ns)
+        if not self._known or late_s < 0:
+            return math.inf
+        return min(max(late_s / _WATCHES_PER_WAIT, _SHORTEST_WATCH_S), POLL_S)
+
+    def _left_s(self, now_ns: int) -> float:
+        return self._takes_s + _LATE_S - (now_ns - self._begun_ns) / NS_PER_S
+
+
+def _apart(one: Six, other: Six) -> float:
+    """Return how far apart two frames are: lengths and angles together, to compare ways by."""
+    turns = (math.remainder(a - b, 360.0) for a, b in zip(one[3:], other[3:], strict=True))
+    return math.hypot(math.dist(one[:3], other[:3]), *turns)
 
 
 _PATIENCE_S: Final = 1.0

@@ -13,9 +13,9 @@ from robolink.controllers.softmotion.answers import (
 )
 from robolink.controllers.softmotion.commands import Require
 from robolink.controllers.softmotion.condition import is_moving
+from robolink.controllers.softmotion.heartbeat import LOOK_S
 from robolink.controllers.softmotion.mailbox import Mailbox
 from robolink.controllers.softmotion.movement import factors, straight
-from robolink.controllers.softmotion.snapshots import LOOK_S
 from robolink.controllers.softmotion.wire import has_ended
 from robolink.errors import (
     ConfigError,
@@ -40,6 +40,9 @@ from robolink.protocols.mailbox import (
     Response,
 )
 from robolink.timing import Deadline
+
+_RAMP_S = 0.5
+"""Time in s in which a jog reaches its speed, and comes to rest: a person watches where it goes."""
 
 _REST_S = 5.0
 """Longest time in which a jog stops, in s."""
@@ -96,7 +99,7 @@ class Jog:
         if self.system is CoordinateSystem.ACS or not axes & _LENGTHS:
             return factors(self.speed_percent)
         if axes <= _LENGTHS:
-            return straight(self.speed_mm_s, unit_um=unit_um)
+            return straight(self.speed_mm_s, unit_um=unit_um, ramp_s=_RAMP_S)
         raise ConfigError(
             tr("Lengths and turns cannot be jogged together."),
             remedy=tr("Jog along X, Y, Z first, then turn."),

@@ -10,10 +10,18 @@ looked for before anything is believed, and the error names what was found
 F70).
 """
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, Protocol, TypeVar
 
-from robolink.controllers.softmotion.heartbeat import FROZEN_S, MOST_OVER, PlcHeartbeat
+from robolink.controllers.softmotion.heartbeat import (
+    FROZEN_S,
+    LOOK_S,
+    MOST_OVER,
+    POLL_S,
+    PlcHeartbeat,
+    poll_period_s,
+)
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import (
     ConnectError,
@@ -100,21 +108,6 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
     )
 
 
-POLL_S: Final = 0.04
-"""Longest time between two looks at the head of the response block, in s."""
-
-_SHORTEST_POLL_S: Final = 0.0005
-_POLLS_PER_WAIT: Final = 4
-"""Number of looks in the time waited so far, so that the looks prolong each wait only slightly.
-
-Most commands end within one or two PLC cycles; if a look itself takes that long, the next one
-follows at once.
-"""
-
-LOOK_S: Final = 0.3
-"""Longest time between two snapshots while waiting for something, in s."""
-
-
 class MotionWatch(Protocol):
     """Somebody who waits for the end of a movement."""
 
@@ -125,17 +118,20 @@ class MotionWatch(Protocol):
         """Whether the head shows nothing but what is on its way, so that no snapshot is needed."""
 
 
+_CYCLE_S: Final = 0.004
+"""A usual cycle of a motion task, in s: an answer that takes longer shows what a command has done.
+"""
+
+_AS_SOON: Final = 1.5
+"""Factor by which a whole look may take longer than the quickest look at the head, and be taken in
+place of both."""
+
 STEP_S: Final = 0.05
 """Longest time for which a snapshot belongs to the present step, in s."""
 
 _READS: Final = 3
 
 T = TypeVar("T")
-
-
-def poll_period_s(waited_s: float) -> float:
-    """Return the time between two looks, in s, after waiting so long."""
-    return min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
 
 
 class Snapshots:
@@ -151,6 +147,7 @@ class Snapshots:
         self._met: Response | None = None
         self._latest: Response | None = None
         self._step: tuple[int, int, Response] | None = None
+        self._head_s, self._whole_s = math.inf, 0.0
 
     @property
     def latest(self) -> Response:
@@ -173,7 +170,7 @@ class Snapshots:
         """
         first = self.take()
         deadline = Deadline.after(self._wire.clock, FROZEN_S)
-        while self._wire.read_head().heartbeat == first.plc_heartbeat:
+        while self._head().heartbeat == first.plc_heartbeat:
             if deadline.expired:
                 raise self._wire.ended(
                     ConnectError(
@@ -199,25 +196,26 @@ class Snapshots:
             TransportBrokenError: The PLC has started anew, or runs another program.
             TransportError: The session is over.
         """
-        asked_ns, commands = self._wire.clock.now_ns(), self._wire.commands
+        commands = self._wire.commands
         now = self._whole(self._wire.read_response, self._read_block, tr("The response block"))
         self._require_met(now)
+        self._whole_s = self._wire.answers.last_s or 0.0
         self._heartbeat.note(now.plc_heartbeat, self._wire.clock.now_ns())
         self._wire.motions.note(now)
-        self._latest, self._step = now, (asked_ns, commands, now)
+        self._latest, self._step = now, (self._wire.clock.now_ns(), commands, now)
         return now
 
     def of_this_step(self) -> Response | None:
         """Return the snapshot that this step has read already; ``None`` where a new one is due.
 
-        It is no older than :data:`STEP_S`, and this client has sent no command since. It spares a
-        reading, but allows nothing: what allows a command is read after its marker, just before
-        the block (:class:`~robolink.controllers.softmotion.commands.CommandSender`).
+        It came no more than :data:`STEP_S` ago, and this client has sent no command since. It
+        spares a reading, but allows nothing: what allows a command is read after its marker, just
+        before the block (:class:`~robolink.controllers.softmotion.commands.CommandSender`).
         """
         if self._step is None:
             return None
-        asked_ns, commands, now = self._step
-        old = self._wire.clock.now_ns() - asked_ns > STEP_S * NS_PER_S
+        came_ns, commands, now = self._step
+        old = self._wire.clock.now_ns() - came_ns > STEP_S * NS_PER_S
         return None if old or commands != self._wire.commands else now
 
     def slot(self, number: int, *, keep: bool = False) -> Slot:
@@ -255,6 +253,8 @@ class Snapshots:
     ) -> Response:
         """Return a snapshot once the head differs from ``since``, or ``wait_s`` has passed.
 
+        Where answers take longer than the PLC, one is read at once.
+
         Args:
             since: The last snapshot.
             wait_s: Longest wait for something new.
@@ -264,15 +264,15 @@ class Snapshots:
         Raises:
             TransportTimeoutError: The PLC's heartbeat stands still; the session is over.
         """
+        if self._whole_at_once:
+            return self._fresh()
         known = (since.ack_head, since.state, since.error_class, since.group_state)
         clock = self._wire.clock
         asked_ns = looked_ns = clock.now_ns()
         until_ns = asked_ns + wait_s * NS_PER_S
         begun_ns = asked_ns if begun_ns is None else begun_ns
         while True:
-            head = self._wire.read_head()
-            now_ns = clock.now_ns()
-            self._heartbeat.note(head.heartbeat, now_ns)
+            head, now_ns = self._head(), clock.now_ns()
             if head[:4] != known or now_ns >= until_ns:
                 break
             period_s = poll_period_s((now_ns - begun_ns) / NS_PER_S)
@@ -302,15 +302,27 @@ class Snapshots:
             pause_s = max(0.0, watch.pause_s(clock.now_ns()) - took_s)
             left_s = over.remaining_s()
             self._wire.pause(left_s if left_s < MOST_OVER * pause_s else pause_s)
-            if over.expired:
+            if over.expired or self._whole_at_once:
                 break  # the snapshot shows what the head would
             asked_ns = clock.now_ns()
-            head = self._wire.read_head()
+            head = self._head()
             took_s = (clock.now_ns() - asked_ns) / NS_PER_S
-            self._heartbeat.note(head.heartbeat, clock.now_ns())
             if not watch.foresees(head):
                 break
         return self._fresh()
+
+    @property
+    def _whole_at_once(self) -> bool:
+        """Whether a look at the head only delays the snapshot that follows it."""
+        slow = not self._wire.whole_look_s and min(self._head_s, self._whole_s) > _CYCLE_S
+        return slow and self._whole_s < _AS_SOON * self._head_s
+
+    def _head(self) -> MailboxHead:
+        """Read the head, and note the heartbeat and how soon it came."""
+        head = self._wire.read_head()
+        self._heartbeat.note(head.heartbeat, self._wire.clock.now_ns())
+        self._head_s = min(self._head_s, self._wire.answers.last_s or 0.0)
+        return head
 
     def _fresh(self) -> Response:
         """Return a snapshot of a PLC that runs."""

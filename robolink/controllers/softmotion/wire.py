@@ -143,6 +143,10 @@ _LOOK_BACK_S: Final = 0.7
 """Longest time in s for a look at what ended the session: a request to a PLC that is gone ends
 within 1 s of its deadline, including this look (docs/reference/faults.md F11)."""
 
+_AT_THE_END: Final = 1.5
+"""For how many answers one waits at the end of a movement: the one that shows it, and half of the
+one that came too early."""
+
 T = TypeVar("T")
 ErrorT = TypeVar("ErrorT", bound=RobolinkError)
 
@@ -213,7 +217,7 @@ class MailboxWire:
 
     def read_head(self) -> MailboxHead:
         """Read the beginning of the response block, after a beat if one is due."""
-        return self._ask(self._link.read_head)
+        return self._ask(self._link.read_head, awaited=self.whole_look_s > 0)
 
     def read_response(self) -> tuple[int, ...]:
         """Read the response block, after a beat if one is due."""
@@ -351,7 +355,7 @@ class MailboxWire:
     def _may_beat(self) -> bool:
         return self._attends or not self.motions.unfinished
 
-    def _ask(self, exchange: Callable[[], T], *, long: bool = False) -> T:
+    def _ask(self, exchange: Callable[[], T], *, long: bool = False, awaited: bool = True) -> T:
         """Do an exchange after a beat; on a serial line a long one always has one before it."""
         ahead = long and self.whole_look_s > 0
         self._require_alive()
@@ -359,7 +363,7 @@ class MailboxWire:
             self._beat_if_due(ahead=ahead)
             if self._attends and self._turns.let_one_in():
                 self._beat_if_due(ahead=ahead)
-            return self._asked(exchange)
+            return self._asked(exchange, awaited=awaited)
 
     def _beat_if_due(self, *, ahead: bool = False) -> None:
         """Write the heartbeat alone, if we own the mailbox and it is due.
@@ -371,7 +375,7 @@ class MailboxWire:
         if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy, ahead=ahead):
             self._asked(lambda: self._link.beat(self.next_beat()))
 
-    def _asked(self, exchange: Callable[[], T]) -> T:
+    def _asked(self, exchange: Callable[[], T], *, awaited: bool = True) -> T:
         """Do an exchange up to three times; only once more when its whole deadline has passed."""
         lost: list[RobolinkError] = []
         deadline = Deadline.after(self.clock, self.timeout_s)
@@ -382,7 +386,7 @@ class MailboxWire:
                     self.exchanges += 1
                     sent_ns = self.clock.now_ns()
                     found = exchange()
-                    self._note_answer(sent_ns)
+                    self._note_answer(sent_ns, awaited=awaited)
                 checkpoint(Checkpoint.EXCHANGE, "read")
                 return found
             except (TransportError, RemoteProtocolError) as error:
@@ -392,12 +396,17 @@ class MailboxWire:
                     break  # nobody answers, or the link can no longer be used
         raise self._over(lost[0])
 
-    def _note_answer(self, sent_ns: int) -> None:
-        """Note an answer; the two that show the end of a movement are waited for."""
+    def _note_answer(self, sent_ns: int, *, awaited: bool = True) -> None:
+        """Note an answer; the one that shows the end of a movement is waited for, and half another.
+
+        Args:
+            sent_ns: When its request was sent.
+            awaited: Whether it would be waited for, too, if answers took longer.
+        """
         moving = self.motions.unfinished
-        self.answers.answered(sent_ns, moving=moving)
+        self.answers.answered(sent_ns, moving=moving, awaited=awaited)
         if self._moved and not moving:
-            self.answers.waited += 2
+            self.answers.waited += _AT_THE_END
         self._moved = moving
 
     def _over(self, error: RobolinkError) -> RobolinkError:

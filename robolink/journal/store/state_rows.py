@@ -101,15 +101,18 @@ class MarkerRows:
             "request": storable(marker.request),
             "begun_at": storable(marker.begun_at),
         }
-        # As it will be read back: keys and numbers that JSON lacks are converted here.
-        details = json.loads(canonical(plain(marker.details)))
+        given = plain(marker.details)
+        text = canonical(given)
+        details = json.loads(text)
+        if details != given:  # keys and values that JSON lacks; it is stored as it will be read
+            text = canonical(details)
         stored = _Stored(
             controller=values["of_controller"],
             operation=values["of_operation"],
             kind=values["kind"],
             request=values["request"],
             begun_at=values["begun_at"],
-            details=canonical(details),
+            details=text,
         )
         values["details"] = _with_sum(stored, details)
         if self._connection.run(statements.ADD_MARKER, values):

@@ -19,7 +19,7 @@ from typing import Final
 from robolink.calibration import Beam, Crossing, carrying, where_they_cross
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.methods.beams.drive import BeamDrive, RunUp, require_reached
+from robolink.methods.beams.drive import HALF_THICKNESS_MM, BeamDrive, RunUp, require_reached
 from robolink.model import Path, Pose
 from robolink.procedures import approach_path
 from robolink.runner import Move, Procedure, Seek
@@ -336,13 +336,38 @@ class BeamLoop:
         drive = scan.drive
         edge = drive.station.edge(scan.beam, broken=broken)
         try:
-            found: Pose = yield Seek(end, edge, drive.plan.crossing_mm_s, purpose)
+            found: Pose = yield Seek(
+                end,
+                edge,
+                drive.plan.crossing_mm_s,
+                purpose,
+                expected=self._stop(scan, end, broken=broken),
+            )
         except CalibrationError as error:
             if error.code == "no_edge":
                 self._here = end
             raise
         self._here = found
         return found
+
+    def _stop(self, scan: LoopScan, end: Pose, *, broken: bool) -> Pose:
+        """Return about where the frame stops behind an edge, on its way to the end."""
+        drive, side = scan.drive, scan.side
+        met = self._met.get((scan.beam, side))
+        if met is not None:
+            at_mm = side * (met.entry_mm if broken else met.exit_mm)
+        else:
+            half_mm = HALF_THICKNESS_MM if drive.met is None else drive.met.half_mm[scan.beam]
+            at_mm = _needs(drive).way_mm + (-half_mm if broken else half_mm)
+        begin_mm = side * self._from_beam(drive, scan.beam)
+        whole_mm = side * self._distance_mm(drive, scan.beam, end) - begin_mm
+        share = min(1.0, max(0.0, (at_mm - begin_mm) / whole_mm)) if whole_mm > 0 else 0.0
+        here = self._here
+        return replace(
+            end,
+            x_mm=here.x_mm + share * (end.x_mm - here.x_mm),
+            y_mm=here.y_mm + share * (end.y_mm - here.y_mm),
+        )
 
 
 def _needs(drive: BeamDrive) -> RunUp:

@@ -188,7 +188,13 @@ class _ZTouchSampler(TouchNames):
             self.near = True
         plan, edge = self.source.plan, self.source.station.edge
         end = offset_z(self._above, -plan.clearance_mm - plan.beyond_mm)
-        step = Seek(end, edge, place, tr("Looking for the surface."))
+        step = Seek(
+            end,
+            edge,
+            place,
+            tr("Looking for the surface."),
+            expected=offset_z(self._above, -plan.clearance_mm),
+        )
         touch = yield from seek_or_retract(step, here=self.here, safe_z_mm=self._safe.z_mm)
         self.here = yield Move(offset_z(touch, plan.back_off_mm), Path.STRAIGHT, tr("Backing off."))
         return Touch(touch.z_mm, place)

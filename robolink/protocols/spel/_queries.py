@@ -18,6 +18,7 @@ import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 from typing import Final, Literal
 
 from robolink.errors import LocalProtocolError
@@ -49,6 +50,12 @@ def print_several(*queries: Statement) -> Statement:
         >>> spel.print_several(spel.print_selected_tool(), spel.print_speed(1))
         'Print Tool, Speed(1)'
     """
+    return _listed(queries)
+
+
+@lru_cache(maxsize=512)
+def _listed(queries: tuple[Statement, ...]) -> Statement:
+    """Return the statement of a list; the same few are asked for, each with a number of its own."""
     for query in queries:
         if not query.startswith(_PRINT):
             raise LocalProtocolError(tr("{query!r} prints nothing that a list takes.", query=query))
@@ -215,6 +222,16 @@ def print_accel_s(index: int) -> Statement:
     """
     check_range(tr("An acceleration's number"), index, 1, _LAST_ACCELERATION)
     return Statement(f"Print AccelS({index})")
+
+
+def print_accel(index: int) -> Statement:
+    """Accel of joint movements in percent: 1 acceleration, 2 deceleration."""
+    return Statement(f"Print Accel({index})")
+
+
+def print_speed_factor() -> Statement:
+    """SpeedFactor in percent: it scales the speed and acceleration of all movements."""
+    return Statement("Print SpeedFactor")
 
 
 def print_joint_angle(joint: int) -> Statement:

@@ -245,10 +245,13 @@ def print_joint_of(target: Pose, joint: int, *, six_axes: bool) -> Statement:
     return Statement(f"Print PAgl({_target(target, six_axes=six_axes)}, {joint})")
 
 
+_ZERO: Final = decimal(0.0)
+
+
 def _xy(values: tuple[float, ...], *, six_axes: bool) -> str:
     written = [decimal(value) for value in values]
     if not six_axes:
-        if any(value != decimal(0.0) for value in written[4:]):
+        if any(value != _ZERO for value in written[4:]):
             raise LocalProtocolError(
                 tr(
                     "A four-axis robot cannot take V = {v} and W = {w}.",

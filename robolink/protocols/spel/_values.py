@@ -14,7 +14,8 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from functools import lru_cache
+from typing import Final, Literal, NamedTuple
 
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
@@ -113,7 +114,6 @@ def parse_boolean(text: str) -> bool:
 
 _KNOWN: Final = re.compile(r"1(?P<gap>[ \t,;]+)22(?P=gap)333")
 _SEPARATORS: Final = " \t,;"
-_LAST: Final = re.compile(r"(.*?)[ \t,;]+([0-9]+)[ \t]*", re.ASCII | re.DOTALL)
 
 
 def gap_in_known_numbers(text: str) -> str | None:
@@ -134,8 +134,12 @@ def gap_in_known_numbers(text: str) -> str | None:
 
 def before_last_number(text: str, number: int) -> str | None:
     """Return what a list shows before a number at its end; ``None`` if it has another end."""
-    match = _LAST.fullmatch(text.strip(_BLANKS))
-    return match[1] if match and match[2] == str(number) else None
+    shown, last = text.strip(_BLANKS), str(number)
+    if not shown.endswith(last):
+        return None
+    rest = shown.removesuffix(last)
+    before = rest.rstrip(_SEPARATORS)
+    return None if before == rest else before  # a longer number ends in these digits, too
 
 
 def split_numbers(text: str, gap: str, count: int) -> tuple[str, ...] | None:
@@ -257,6 +261,30 @@ def _angle_marks(posture: Posture) -> tuple[str, ...]:
     return tuple(f"J{joint}A({decimal(a)})" for joint, a in angles.items() if a is not None)
 
 
+class _Flags(NamedTuple):
+    """What stands behind the coordinates of a printed point; see :class:`PrintedPoint`."""
+
+    flags: tuple[str, ...]
+    hand: Hand | None
+    local: int
+    posture: Posture | None
+
+
+@lru_cache(maxsize=64)
+def _read_flags(text: str) -> _Flags:
+    """Read ``/R /0``; each point of a cell ends in one of the same few.
+
+    Raises:
+        ValueError: They contradict each other.
+    """
+    flags = tuple(flag.strip() for flag in text.split("/")[1:])
+    hands = [_HANDS[flag] for flag in flags if flag in _HANDS]
+    local, *more = [int(flag) for flag in flags if flag.isdigit()] or [0]
+    if more or local > _HIGHEST_LOCAL or len(hands) > 1:
+        raise ValueError(text)
+    return _Flags(flags, hands[0] if hands else None, local, _posture(flags))
+
+
 def _posture(flags: tuple[str, ...]) -> Posture | None:
     """Return the posture that flags name; what they leave out is that of a point without flags.
 
@@ -292,22 +320,12 @@ def parse_point(text: str) -> PrintedPoint:
     if match is None:
         raise unreadable(tr("a point"), text)
     *numbers, tail = match.groups()
-    flags = tuple(flag.strip() for flag in tail.split("/")[1:])
-    hands = [_HANDS[flag] for flag in flags if flag in _HANDS]
-    local, *more = [int(flag) for flag in flags if flag.isdigit()] or [0]
-    if more or local > _HIGHEST_LOCAL or len(hands) > 1:
-        raise unreadable(tr("a point"), text)
     try:
-        posture = _posture(flags)
+        found = _read_flags(tail)
     except ValueError as error:
         raise unreadable(tr("a point"), text) from error
-    return PrintedPoint(
-        coordinates=tuple(float(number) for number in numbers if number is not None),
-        hand=hands[0] if hands else None,
-        flags=flags,
-        local=local,
-        posture=posture,
-    )
+    coordinates = tuple([float(number) for number in numbers if number is not None])
+    return PrintedPoint(coordinates, found.hand, found.flags, found.local, found.posture)
 
 
 def format_point(

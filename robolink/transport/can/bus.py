@@ -103,6 +103,10 @@ def _settings(url: LinkUrl, options: UrlOptions, interface: str) -> dict[str, An
     return settings
 
 
+_ID_BYTES: Final = 2
+"""Length of the identifier of a frame, as it is told and counted."""
+
+
 class CanLine:
     """A bus that its waiting caller reads. Owns it; :meth:`close` may come from any thread.
 
@@ -130,6 +134,8 @@ class CanLine:
             raise self._ended(error) from error
         if message and message.is_error_frame and message.arbitration_id & _BUS_OFF:
             raise self._bus_off()
+        if message:
+            self._traffic.count += _ID_BYTES + len(message.data)
         if message and self._traffic.listened():
             self._traffic.received(_frame(message.arbitration_id, bytes(message.data)))
         return message
@@ -137,6 +143,7 @@ class CanLine:
     def send(self, identifier: int, data: bytes) -> None:
         """Send one frame with an 11-bit identifier, once. Raises as :meth:`receive`."""
         message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+        self._traffic.count += _ID_BYTES + len(data)
         if self._traffic.listened():
             self._traffic.sent(_frame(identifier, data))
         try:

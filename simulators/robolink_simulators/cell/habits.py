@@ -5,6 +5,7 @@ Assumed, all of it: these are habits that people have, and nothing was measured.
 
 import math
 import random
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -127,12 +128,11 @@ class TouchCourse:
         """Repeat the same touch, because it was asked for again."""
         return self._taken(0.0)
 
-    def aim_mm(self, flange_x: Direction, flange_y: Direction) -> XyzMm:
+    def aim_mm(self, turned: Callable[[Direction], Direction]) -> XyzMm:
         """Return where the tip ends beside the pin: base axes, mm.
 
         Args:
-            flange_x: How the flange's X lies in the base now.
-            flange_y: The same of its Y.
+            turned: Tells how a direction on the flange lies in the base now.
         """
         habits = self._habits
         toward = math.radians(habits.bias_toward_deg)
@@ -141,8 +141,7 @@ class TouchCourse:
         if habits.bias_frame == "approach":
             side = self._came_from
         elif habits.bias_frame == "tool":
-            x, y, z = (along * a + across * b for a, b in zip(flange_x, flange_y, strict=True))
-            side = (x, y, z)
+            side = turned(side)
         return (
             habits.bias_mm * side[0] + self._walked_mm[0],
             habits.bias_mm * side[1] + self._walked_mm[1],

@@ -51,6 +51,7 @@ class SimulatedOperator:
         self._random = late_random(f"operator {seed}")
         self._placement: tuple[Hashable, int] | None = None
         self._error = PersonLook(0.0, 0.0, 0.0)
+        self._parameters = workplace.parameters
         self._habits = workplace.parameters.habits, workplace.parameters.bump
         self._course = TouchCourse(self._habits[0], late_random(f"habits {seed}"))
         self._manner: PersonManner | None = None
@@ -150,16 +151,19 @@ class SimulatedOperator:
     def _present_course(self) -> TouchCourse:
         """Return the touches under the present habits; others begin a new count."""
         parameters = self._workplace.parameters
-        if self._habits != (parameters.habits, parameters.bump):
-            self._habits = parameters.habits, parameters.bump
-            rng = late_random(f"habits {self._seed}")
-            self._course = TouchCourse(parameters.habits, rng)
-            self._manner = self._left_at = None
+        if parameters is not self._parameters:  # what is set makes others: these never change
+            self._parameters = parameters
+            habits = parameters.habits, parameters.bump
+            if habits != self._habits:
+                self._habits = habits
+                rng = late_random(f"habits {self._seed}")
+                self._course = TouchCourse(parameters.habits, rng)
+                self._manner = self._left_at = None
         return self._course
 
     def _gap(self, tool: int) -> XyzMm:
-        robot, error = self._workplace.robot, self._error
-        aim = self._course.aim_mm(robot.turned((1.0, 0.0, 0.0)), robot.turned((0.0, 1.0, 0.0)))
+        error = self._error
+        aim = self._course.aim_mm(self._workplace.robot.turned)
         gap = self._workplace.gap_mm(tool)
         if self._workplace.surface is not None and self._spot_mm is not None:
             gap = subtract(self._spot_mm, self._workplace.tip_mm(tool))

@@ -23,7 +23,7 @@ Mishap = Callable[[Callable[[], Any]], Any]
 class PlcLink:
     """A :class:`robolink.transport.MailboxLink` to a :class:`Plc`, in the same thread.
 
-    Each exchange takes a millisecond of the PLC's clock.
+    Each exchange takes a time of the PLC's clock, usually a millisecond.
 
     Attributes:
         reachable: Whether another link can be opened when this one has ended.
@@ -32,6 +32,7 @@ class PlcLink:
         beats: Every heartbeat word that was written alone.
         response: Changes every response block that is read.
         command: Changes every command block on its way.
+        answer_s: How long an exchange takes.
     """
 
     def __init__(self, plc: Plc) -> None:
@@ -47,6 +48,7 @@ class PlcLink:
         self.beats: list[int] = []
         self.response: Distortion = tuple
         self.command: Distortion = tuple
+        self.answer_s = 0.001
         self._order = WordOrder.LOW_FIRST
         self._mishaps: dict[str, list[Mishap]] = {}
 
@@ -138,7 +140,7 @@ class PlcLink:
     def _exchange(self, method: str, deliver: Callable[[], T]) -> T:
         if self.closed:
             raise TransportClosedError("closed", remedy="connect again")
-        self.clock.sleep(0.001)
+        self.clock.sleep(self.answer_s)
         planned = self._mishaps.get(method)
         mishap: Mishap = planned.pop(0) if planned else _no_mishap
         answer: T = mishap(deliver)

@@ -28,7 +28,7 @@ def group_of(cell, stated=STATED):
     return controller.groups[0]
 
 
-@pytest.mark.parametrize(("speed_mm_s", "expected"), [(100.0, 120.0), (60.0, 120.0), (20.0, 40.0)])
+@pytest.mark.parametrize(("speed_mm_s", "expected"), [(100.0, 120.0), (24.0, 120.0), (20.0, 100.0)])
 @pytest.mark.parametrize("unit_um", [1000.0, 10.0])
 def test_a_straight_movement_is_lowered_to_it_and_never_raised(
     cell, plc, speed_mm_s, expected, unit_um
@@ -39,7 +39,7 @@ def test_a_straight_movement_is_lowered_to_it_and_never_raised(
     velocity, acceleration, deceleration, jerk = plc.executed[-1].dynamics
     assert velocity == pytest.approx(speed_mm_s * 1000 / unit_um)
     assert acceleration == deceleration == pytest.approx(expected * 1000 / unit_um)
-    assert jerk == pytest.approx(2 * acceleration)
+    assert jerk == pytest.approx(5 * acceleration)
 
 
 def test_a_joint_movement_and_a_jog_keep_their_own(cell, plc):
@@ -89,7 +89,7 @@ def test_the_run_up_is_that_of_the_lower_one(cell):
 
 
 def test_without_it_nothing_is_different():
-    assert straight(100.0, unit_um=1000.0) == (100.0, 200.0, 200.0, 400.0)
+    assert straight(100.0, unit_um=1000.0) == (100.0, 500.0, 500.0, 2500.0)
 
 
 def test_a_program_that_moves_nothing_keeps_to_none(cell, plc):

@@ -15,9 +15,16 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.controllers import Jog
-from robolink.controllers.softmotion.heartbeat import PAUSED_BEAT_S, Turns, shared_out
-from robolink.controllers.softmotion.movement import ExpectedEnd, shortest_time_s
-from robolink.controllers.softmotion.snapshots import LOOK_S, POLL_S, STEP_S
+from robolink.controllers.softmotion.heartbeat import (
+    LOOK_S,
+    PAUSED_BEAT_S,
+    POLL_S,
+    ExpectedEnd,
+    Turns,
+    shared_out,
+)
+from robolink.controllers.softmotion.movement import shortest_time_s
+from robolink.controllers.softmotion.snapshots import STEP_S
 from robolink.errors import (
     ControllerFaultError,
     LeaseLostError,
@@ -32,11 +39,9 @@ from robolink.errors import (
 from robolink.model import MarkerKind, MotionOutcome, MotionProfile, Path, Pose, WorkBox
 from robolink.protocols.mailbox import (
     Bits,
-    Command,
     ErrorClass,
     GroupState,
     Opcode,
-    Response,
     decode_response,
     encode_response,
     next_number,
@@ -410,11 +415,9 @@ def test_the_shortest_time_of_a_way_is_that_of_its_speed_and_acceleration(distan
 
 
 def test_a_turn_over_the_end_of_the_circle_is_a_short_way():
-    start = Response(tcp=(0.0, 0.0, 0.0, 179.0, 0.0, 0.0))
-    command = Command(1, Opcode.MOVE_DIRECT, pose=(0.0, 0.0, 0.0, -175.0, 0.0, 0.0))
-    end = ExpectedEnd(command, start, 0)
-    end.saw(replace(start, tcp=(0.0, 0.0, 0.0, -179.9, 0.0, 0.0)), 1_000 * MS)
-    assert end.patience_s(1_000 * MS) == pytest.approx(shared_out(1.012, LOOK_S))
+    end = ExpectedEnd((0.0, 0.0, 0.0, 179.0, 0.0, 0.0), (0.0, 0.0, 0.0, -175.0, 0.0, 0.0), 0)
+    end.saw((0.0, 0.0, 0.0, -179.9, 0.0, 0.0), 1_000 * MS)
+    assert end.patience_s(1_000 * MS) == pytest.approx(shared_out(1.008, LOOK_S))
 
 
 def test_an_end_that_another_reading_showed_is_no_rest(cell, plc, controller, group, monkeypatch):

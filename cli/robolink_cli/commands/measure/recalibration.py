@@ -403,10 +403,12 @@ class Recalibration:
         record is made before the robot has come to its end.
         """
         clock, answered = controller.clock, controller.exchanges
+        carried = controller.traffic_bytes
         began_ns = clock.now_ns()
         report = run.run()
         took_s = round((clock.now_ns() - began_ns) / NS_PER_S, 1)
         exchanges = controller.exchanges - answered
+        traffic = controller.traffic_bytes
         document = self._told(controller, run, report)
         robot_s = None if run.robot_s is None else round(run.robot_s, 1)
         say(_took(took_s, robot_s, exchanges))
@@ -417,6 +419,7 @@ class Recalibration:
             "took_s": took_s,
             "robot_s": robot_s,
             "exchanges": exchanges,
+            "traffic_bytes": None if traffic is None else traffic - (carried or 0),
             "robot_time": _robot_time(run),
         }
 

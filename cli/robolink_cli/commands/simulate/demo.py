@@ -90,6 +90,7 @@ class DemonstratedChange(ABC):
         robot: What moves.
         truth: Where the tip really is.
         exchanges: Requests that it took, with those of connecting.
+        traffic_bytes: The bytes of these requests and their answers.
         simulated_s: How many seconds of simulated time passed meanwhile: movements, answers and
             what the simulated person needed. ``None`` where simulated time runs along with real
             time: that would measure this computer.
@@ -99,11 +100,14 @@ class DemonstratedChange(ABC):
     robot: str
     truth: ToolOffset
     exchanges: int
+    traffic_bytes: int | None
     simulated_s: float | None
 
     def payload(self) -> dict[str, object]:
         """Return it as plain JSON."""
-        named = json_fields(self, "kind", "robot", "truth", "exchanges", "simulated_s")
+        named = json_fields(
+            self, "kind", "robot", "truth", "exchanges", "traffic_bytes", "simulated_s"
+        )
         return {**named, **self.end()}
 
     @abstractmethod
@@ -422,11 +426,12 @@ class _Cell:
             )
         return AcceptedChange(self.kind, self.robot, truth, *self._spent(controller), report)
 
-    def _spent(self, controller: Controller) -> tuple[int, float | None]:
-        """Return the exchanges since the cell was connected to, and their simulated seconds."""
+    def _spent(self, controller: Controller) -> tuple[int, int | None, float | None]:
+        """Return the exchanges since the cell was connected to, their bytes, and seconds."""
         clock = controller.clock  # that of a simulator in this process began at 0
         simulated = isinstance(clock, ManualClock)
-        return controller.exchanges, clock.now_ns() / NS_PER_S if simulated else None
+        simulated_s = clock.now_ns() / NS_PER_S if simulated else None
+        return controller.exchanges, controller.traffic_bytes, simulated_s
 
     def _report(self, controller: Controller) -> ToolReport:
         controller.motors(True)

@@ -7,7 +7,7 @@ is (assumed: a real one needs a few milliseconds to come to rest).
 import math
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Final
 
@@ -227,12 +227,17 @@ class Arm:
         standard deviation ``noise_mm`` (seen in a transcript: 2 um, docs/reference/epson.md 6,
         vector 11).
         """
-        pose = forward(model or self.model, self._joints)
-        return replace(
-            pose,
-            x_mm=rng.gauss(pose.x_mm, noise_mm),
-            y_mm=rng.gauss(pose.y_mm, noise_mm),
-            z_mm=rng.gauss(pose.z_mm, noise_mm),
+        pose, scattered = forward(model or self.model, self._joints), rng.gauss
+        return Pose(
+            scattered(pose.x_mm, noise_mm),
+            scattered(pose.y_mm, noise_mm),
+            scattered(pose.z_mm, noise_mm),
+            pose.u_deg,
+            pose.v_deg,
+            pose.w_deg,
+            hand=pose.hand,
+            tool=pose.tool,
+            posture=pose.posture,
         )
 
     def plan_go(self, target: Joints, pace: JointPace, *, radius_mm: float = 0.0) -> JointLeg:

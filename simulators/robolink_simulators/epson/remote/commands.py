@@ -11,7 +11,7 @@ The order of fields is that of Epson's own client; the values are the simulator'
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from functools import cached_property, lru_cache, partial
 from typing import Final
 
@@ -324,9 +324,10 @@ class CommandDesk:
             raise RequestRefused(options.monitoring_refusal)
         if executing and not command.allowed_during_execute(options.rc_plus):
             raise RequestRefused(ErrorCode.EXECUTE_RUNNING)
-        judged = command.needs or command.forbids
-        if judged and not _met(command, self._condition.flags()):
-            raise RequestRefused(ErrorCode.NOT_READY)
+        if command.needs or command.forbids:
+            on = _names_of(self._condition.flags())
+            if not (command.needs <= on and command.forbids.isdisjoint(on)):
+                raise RequestRefused(ErrorCode.NOT_READY)
 
     def serve(self, request: Request) -> Fields:
         """Carry a request out.
@@ -405,7 +406,6 @@ class CommandDesk:
 
 
 @lru_cache(maxsize=512)
-def _met(command: RemoteCommand, flags: StatusFlags) -> bool:
-    return all(getattr(flags, name) for name in command.needs) and not any(
-        getattr(flags, name) for name in command.forbids
-    )
+def _names_of(flags: StatusFlags) -> frozenset[str]:
+    """Return the names of the flags that are on."""
+    return frozenset(one.name for one in fields(flags) if getattr(flags, one.name))

@@ -155,7 +155,7 @@ class PendingRequest:
 
     def meets(self, action: FaultAction) -> bool:
         """Return whether a fault of this kind is planned for it."""
-        return any(fault.action is action for fault in self.faults)
+        return bool(self.faults) and any(fault.action is action for fault in self.faults)
 
 
 _SILENCE_NS: Final = 100_000_000

@@ -139,7 +139,6 @@ class StatementExecution:
     Attributes:
         output: What was printed so far; each Print ends with CRLF unless it said otherwise.
         error: Why it failed, ``None`` while it has not.
-        moves: Whether it moves the robot.
 
     Example:
         >>> import random
@@ -168,7 +167,7 @@ class StatementExecution:
     ) -> None:
         self.output = ""
         self.error: SpelError | None = None
-        self.moves = any(isinstance(one, MotionStatement) for one in statements)
+        self._statements = statements
         self._evaluator = evaluator
         self._pending = list(reversed(statements))
         self._began_ns = now_ns
@@ -188,6 +187,11 @@ class StatementExecution:
     def done(self) -> bool:
         """Whether it has ended, well or not."""
         return self._done
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves the robot."""
+        return any(isinstance(one, MotionStatement) for one in self._statements)
 
     @property
     def ended_ns(self) -> int:
@@ -261,10 +265,11 @@ class StatementExecution:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``; each statement starts when the last one ends."""
-        arm = self._evaluator.session.machine.arm
+        machine = self._evaluator.session.machine
+        arm = machine.robot.arm
         while not self._done and now_ns >= (change_ns := self._change_ns):
             arm.advance(change_ns)
-            self._evaluator.session.machine.timed_bits.advance(change_ns)
+            machine.timed_bits.advance(change_ns)
             self._take_up(change_ns)
             self._seen_ns = change_ns
         arm.advance(now_ns)

@@ -6,6 +6,7 @@ A client sends the same few lines with another place in each, or another number 
 reading a line takes a millisecond of the processor, filling it some microseconds.
 """
 
+import pickle
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
@@ -224,13 +225,23 @@ def prepare() -> None:
     _parser()
 
 
-@lru_cache(maxsize=1024)
 def parse(text: str) -> tuple[Statement, ...]:
     """Return the statements in one line, separated by semicolons.
 
     Raises:
         Refusal: The line is not SPEL+, or holds a statement that only programs may use.
     """
+    # A line with decimals leads to a place that hardly comes again, and would be kept for nothing.
+    passing = "." in text and _QUOTES.isdisjoint(text)
+    return _parsed(text) if passing else _kept(text)
+
+
+@lru_cache(maxsize=1024)
+def _kept(text: str) -> tuple[Statement, ...]:
+    return _parsed(text)
+
+
+def _parsed(text: str) -> tuple[Statement, ...]:
     shape, numbers = marked(text)
     fill = _shape(shape, len(numbers)) if numbers else None
     if fill is None:
@@ -282,8 +293,15 @@ def _statement_word() -> re.Pattern[str]:
 
 
 def _program_line(text: str) -> tuple[LineNode, ...]:
-    nodes: tuple[LineNode, ...] = _parser().parse(text, start="program_line")  # type: ignore[assignment]
+    # What runs is known by its node, so lines with the same text have nodes of their own.
+    nodes: tuple[LineNode, ...] = pickle.loads(_kept_line(text))
     return nodes
+
+
+@lru_cache(maxsize=4096)
+def _kept_line(text: str) -> bytes:
+    """Return a line's statements in a form to copy; a cell in each test has the same program."""
+    return pickle.dumps(_parser().parse(text, start="program_line"))
 
 
 def _refusal(text: str, error: LarkError) -> SpelRefusal:

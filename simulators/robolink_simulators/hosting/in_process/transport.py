@@ -148,9 +148,11 @@ class InProcessTransport:
     def _taken(self) -> bytes | None:
         self._pump()
         if not self._arrived:
+            if not self._link.closed:
+                return None
             if self._resettable is not None and self._resettable.reset:
                 raise self._broken()
-            return b"" if self._link.closed else None
+            return b""
         most = min(len(self._arrived), _CHUNK_BYTES)
         count = most if self._splitter is None else self._splitter.randint(1, most)
         taken, self._arrived = self._arrived[:count], self._arrived[count:]

@@ -1,6 +1,6 @@
 """What moves the axes of a group: movements, a jog, or single axes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axes import Axis
@@ -152,12 +152,13 @@ class GroupMotion:
         """
         self.follow(now_ns)
         self._end_singles()
-        self._look_for_edges(now_ns)
+        self._look_for_edges(now_ns, self.queue.running)
         for movement in self.queue.settle(now_ns):
             self._end(movement)
         if not self.interrupting:
-            self.queue.start_due(now_ns)
-            self._look_for_edges(now_ns)
+            began = self.queue.start_due(now_ns)
+            if began is not None:
+                self._look_for_edges(now_ns, (began,))
         if self.jog is not None and not self.queue.running:
             self._step_jog(self.jog)
 
@@ -205,8 +206,8 @@ class GroupMotion:
             jog.execution.finish()
             self.jog = None
 
-    def _look_for_edges(self, now_ns: int) -> None:
-        for movement in self.queue.running:
+    def _look_for_edges(self, now_ns: int, movements: Iterable[Movement]) -> None:
+        for movement in movements:
             watch = movement.watch
             if watch is None or movement.latched:
                 continue

@@ -94,8 +94,8 @@ class Movement:
         self.armed = False
         self._base = base
         self._pace = pace
-        self._profile = SpeedProfile.fastest(0.0, pace)
         self._start_ns: int | None = None
+        self._take_up(SpeedProfile.fastest(0.0, pace))
         self._braked = False
 
     @property
@@ -127,7 +127,7 @@ class Movement:
     @property
     def rest_ns(self) -> int:
         """When it stops."""
-        return self._instant(self._profile.duration_s)
+        return self._rest_ns
 
     @property
     def falls_ns(self) -> int:
@@ -143,21 +143,21 @@ class Movement:
         """Return how much of its path it has covered."""
         if self._start_ns is None:
             return self._profile.start
-        if now_ns >= self.rest_ns:
+        if now_ns >= self._rest_ns:
             return self._profile.end
         return self._profile.share_at((now_ns - self._start_ns) / NS_PER_S)
 
     def start(self, now_ns: int) -> None:
         """Begin, or continue after an interruption, from rest."""
         share = self._profile.end if self.begun else 0.0
-        self._profile = SpeedProfile.fastest(share, self._pace)
         self._start_ns = now_ns
+        self._take_up(SpeedProfile.fastest(share, self._pace))
         self._braked = False
         self.execution.activate()
 
     def brake(self, now_ns: int) -> None:
         """Stop on the path with the movement's own deceleration (assumed)."""
-        self._profile = self._braked_profile(now_ns)
+        self._take_up(self._braked_profile(now_ns))
         self._braked = self._profile.end < 1
 
     def share_if_braked(self, now_ns: int) -> float:
@@ -186,6 +186,10 @@ class Movement:
             return self._profile
         elapsed_s = (now_ns - self._start_ns) / NS_PER_S
         return self._profile.braked(elapsed_s, self._pace.fall_per_s2)
+
+    def _take_up(self, profile: SpeedProfile) -> None:
+        # Calculated once, because every cycle of the motion task reads it.
+        self._profile, self._rest_ns = profile, self._instant(profile.duration_s)
 
     def _instant(self, elapsed_s: float) -> int:
         return (self._start_ns or 0) + round(elapsed_s * NS_PER_S)
@@ -299,13 +303,15 @@ class MovementQueue:
             rested.append(self._running.pop(0))
         return rested
 
-    def start_due(self, now_ns: int) -> None:
-        """Begin what may begin now."""
+    def start_due(self, now_ns: int) -> Movement | None:
+        """Begin what may begin now, and return it; ``None`` for nothing."""
         corner = self._corner_ahead() and self._running[0].falls_ns <= now_ns
-        if self._waiting and (corner or not self._running):
-            movement = self._waiting.popleft()
-            movement.start(now_ns)
-            self._running.append(movement)
+        if not self._waiting or not (corner or not self._running):
+            return None
+        movement = self._waiting.popleft()
+        movement.start(now_ns)
+        self._running.append(movement)
+        return movement
 
     def _corner_ahead(self) -> bool:
         if not self._waiting or len(self._running) != 1:

@@ -109,6 +109,7 @@ class LinePath:
     _way: Vector = field(init=False, repr=False, compare=False)
     _turn: tuple[Vector, float] = field(init=False, repr=False, compare=False)
     _unturned: Matrix = field(init=False, repr=False, compare=False)
+    _axes: JointPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # A movement evaluates its path in every cycle.
@@ -117,6 +118,7 @@ class LinePath:
         object.__setattr__(self, "_way", subtract(b.shift_mm, a.shift_mm))
         object.__setattr__(self, "_turn", (axis, angle_deg))
         object.__setattr__(self, "_unturned", product(about(axis, 0.0), a.rotation))
+        object.__setattr__(self, "_axes", JointPath(self.start, self.end))
 
     def tcp_at(self, share: float) -> Frame:
         """Return the TCP after a share of the path."""
@@ -148,7 +150,7 @@ class LinePath:
         return self._turn[1]
 
     def _axes_for(self, tcp: Frame, share: float) -> AxisValues:
-        near = JointPath(self.start, self.end).axes_at(share)
+        near = self._axes.axes_at(share)
         return axes_for_tcp(self.kinematics, tcp, self.tool, self.configuration, near=near)
 
 

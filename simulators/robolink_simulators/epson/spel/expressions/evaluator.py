@@ -274,8 +274,9 @@ class Evaluator:
 
 
 def _bounded(point: Point) -> Point:
-    if any(not abs(value) <= FARTHEST for value in point.coordinates):
-        raise out_of_range("Coordinate out of range")
+    for value in point.coordinates:
+        if not abs(value) <= FARTHEST:  # that refuses what is no number, too
+            raise out_of_range("Coordinate out of range")
     return point
 
 
@@ -288,7 +289,8 @@ def _local_number(word: str) -> int:
 
 def _flagged(point: Point, word: str) -> Point:
     if word in _HANDS:
-        return replace(point, hand=_HANDS[word])
+        hand = _HANDS[word]
+        return point if hand is point.hand else replace(point, hand=hand)
     if word.isdigit():
         number = _local_number(word)
         return point if number == point.local else replace(point, local=number)

@@ -95,11 +95,13 @@ def checked(value: Value) -> Value:
     Raises:
         Refusal: Beyond Int64 and UInt64, not finite, or a string of more than 255 characters.
     """
-    if isinstance(value, float) and not math.isfinite(value):
-        raise SpelRefusal(RefusalKind.OVERFLOW, "Overflow")
-    if isinstance(value, int) and not -LARGEST_INT <= value <= _LARGEST_UNSIGNED:
-        raise SpelRefusal(RefusalKind.OVERFLOW, "Overflow")
-    if isinstance(value, str) and len(value) > LONGEST_STRING:
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise SpelRefusal(RefusalKind.OVERFLOW, "Overflow")
+    elif isinstance(value, int):
+        if not -LARGEST_INT <= value <= _LARGEST_UNSIGNED:
+            raise SpelRefusal(RefusalKind.OVERFLOW, "Overflow")
+    elif isinstance(value, str) and len(value) > LONGEST_STRING:
         raise SpelRefusal(RefusalKind.TEXT_LENGTH, "String longer than 255 characters")
     return value
 

@@ -292,9 +292,7 @@ class Panel:
         job = board.job if board is not None else None
         if board is None or job is None or not finger:
             return
-        if what == "release":
-            job.release(finger)
-        elif self._is_late(frame):
+        if what == "release" or self._is_late(frame):
             job.release(finger)
         elif what == "beat":
             job.beat(finger)

@@ -13,7 +13,6 @@ from robolink_cli.wizard.views.records import (
     Arrow,
     CheckRow,
     CheckView,
-    ListRow,
     ChoiceView,
     CoordinateRow,
     EndView,
@@ -21,6 +20,7 @@ from robolink_cli.wizard.views.records import (
     FitView,
     Head,
     JogPad,
+    ListRow,
     MovingView,
     QuestionView,
     Status,
@@ -80,12 +80,8 @@ def _english():
                 ("Controller EPSON RC90-B, serial 0815; tool 1 is selected.",),
                 "Which job?",
                 (
-                    ListRow(
-                        "Needle 22G on the pin", "1", ("last done 26 Nov, Chen; about 4 min",)
-                    ),
-                    ListRow(
-                        "One touch", "2", ("full calibration due in 3 changes; about 1 min",)
-                    ),
+                    ListRow("Needle 22G on the pin", "1", ("last done 26 Nov, Chen; about 4 min",)),
+                    ListRow("One touch", "2", ("full calibration due in 3 changes; about 1 min",)),
                     ListRow("Two nozzles", "3", ("never done here",)),
                     ListRow("Find station PIN-07 again", "4", ("engineers only",)),
                 ),

@@ -143,8 +143,8 @@ class Board:
             self._drawn[watcher] = found
         return found
 
-    def status(self, now_s: float) -> tuple[int, dict[str, object]]:
-        """Return the age of the last reading in ms, and what it was."""
+    def status(self, now_s: float) -> tuple[int | None, dict[str, object]]:
+        """Return the age of the last reading in ms, and what it was; ``None`` without one."""
         view, job = self.view, self.job
         if view is not None and view.status is not None and job is not None:
             status = asdict(view.status)
@@ -153,7 +153,7 @@ class Board:
         look = self.watch.look
         if job is None and look is not None and not look.failed:
             return round((now_s - look.taken_s) * 1000), {"state": look.state}
-        return 0, {}
+        return None, {}
 
     def card(self, watcher: Watcher, now_s: float, *, seat: str = "") -> CellCard:
         """Return what the overview shows of it."""

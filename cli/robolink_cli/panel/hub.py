@@ -310,7 +310,7 @@ class Hub:
     def beat(self, live: LivePage, now_s: float) -> dict[str, object]:
         """Return the frame that shows that this server is alive."""
         board = self.boards.get(live.cell)
-        age_ms, status = board.status(now_s) if board is not None else (0, {})
+        age_ms, status = board.status(now_s) if board is not None else (None, {})
         return {"t": "beat", "age_ms": age_ms, "status": status}
 
 

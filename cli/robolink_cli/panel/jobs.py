@@ -13,12 +13,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from robolink.messages import declared
+from robolink.messages import declared, spoken
 from robolink.model import PersonRole
 from robolink_cli.console.language import VARIABLE
+from robolink_cli.panel.words import speaking_in
 from robolink_cli.wizard.views.records import View
 from robolink_cli.wizard.views.wire import from_wire
 
@@ -271,7 +272,7 @@ class PanelJob:
     def _heard(self, said: Mapping[str, Any]) -> None:
         match said["t"]:
             case "view":
-                self.view, self.view_s = from_wire(said["view"]), time.monotonic()
+                self.view, self.view_s = self._named(from_wire(said["view"])), time.monotonic()
             case "told":
                 self.told.append(str(said["text"]))
             case "left":
@@ -279,6 +280,15 @@ class PanelJob:
             case _:
                 return
         self._changed()
+
+    def _named(self, view: View) -> View:
+        """Return a view with cell and job in its head, where the command did not name them yet."""
+        head = view.head
+        if head.cell and head.job:
+            return view
+        with speaking_in(self.language):
+            title = spoken(self.kind.title)
+        return replace(view, head=replace(head, cell=head.cell or self.cell, job=head.job or title))
 
 
 def options_of(kind: JobKind, given: object) -> dict[str, str]:

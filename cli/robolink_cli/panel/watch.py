@@ -189,6 +189,7 @@ def card_of(
             mark=_mark(look) if now_s - look.taken_s < STALE_AFTER_S else "unknown",
             word=state_word(look.state) if look.state else tr("not read"),
             lines=_read(look, now_s),
+            read=True,
             simulated=simulated or look.simulated is True,
         )
     lines = standing.lines()

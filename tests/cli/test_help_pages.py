@@ -17,6 +17,7 @@ from robolink_cli.console.tables import columns
 from robolink_cli.options.declaration import CliArgument, CliOption, add_declared, declared_options
 
 from robolink import messages
+from robolink.locale import languages
 
 # Every help page fits into 80 columns, in whole sentences, in each language alike.
 
@@ -41,7 +42,7 @@ def shown(request, monkeypatch, capsys):
     """Every page, by its path."""
     monkeypatch.setenv("COLUMNS", "80")
     # A catalogue is read once, and not for each page.
-    monkeypatch.setattr(language, "translator", cache(language.translator))
+    monkeypatch.setattr(language, "translator", cache(languages.translator))
     texts = {}
     try:
         for path in pages():

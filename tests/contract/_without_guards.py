@@ -235,6 +235,8 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.markers.ProcedureLock.held": _open,
     "robolink.controllers.ControllerCore.procedure": _open,
     "robolink_cli.session.motion_consent.agree_to_motion": _nothing,
+    "robolink_cli.wizard.lease.JogLease.spend": lambda _lease, _now_s: True,
+    "robolink.runner.permitted_by": _open,
     "robolink_cli.panel.guard.requests.PageRequest.foreign": _nothing,
     "robolink_cli.panel.guard.requests.is_host": lambda *_given: True,
     "robolink_cli.panel.guard.access.Access.is_paired": lambda *_given: True,
@@ -251,6 +253,9 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.transport.tcp.TcpTransport.send": _sent_in_part,
 }
 _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
+    "robolink_cli.wizard.views.offered.refusal": {
+        "robolink_cli.wizard.flow.refusal": lambda _view, _press: ""
+    },
     "robolink_cli.prompts.questions.agree": {
         "robolink_cli.prompts.questions.agree": _nothing,
         "robolink_cli.commands.controller.tool.agree": _nothing,

@@ -223,7 +223,9 @@ def test_a_round_is_driven_in_low_power_and_leaves_production_as_it_was(tmp_path
 
 def test_every_search_has_the_speed_that_its_line_tells(cells):
     """The speed of travel, in which the tip goes from side to side, would shift every edge."""
-    cell, searched, travelled = cells(), set(), set()
+    cell = cells()
+    searched: set[float] = set()
+    travelled: set[float] = set()
     machine = cell.simulator.machine
 
     def note(_task, file, _number, text):

@@ -11,7 +11,7 @@ inner ones of rows of polls. ``pytest -s`` shows how many.
 """
 
 import re
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -41,16 +41,13 @@ EACH_TIME: Final[dict[str, tuple[str, ...]]] = {
 
 One run of a recipe serves all its disturbances, each at instants of its own.
 """
-ROWS: Final = [(name, (how,)) for name, how in TESTS]
+ROWS: Final[list[Any]] = [
+    pytest.param(name, (how,), marks=() if EVERYTHING else pytest.mark.soak)
+    for name, how in TESTS
+    if EVERYTHING or how not in EACH_TIME.get(name, ())
+]
 if not EVERYTHING:
-    ROWS[:] = [
-        *EACH_TIME.items(),
-        *(
-            pytest.param(name, hows, marks=pytest.mark.soak)
-            for name, hows in ROWS
-            if hows[0] not in EACH_TIME.get(name, ())
-        ),
-    ]
+    ROWS.extend(EACH_TIME.items())
 MATTERS: Final = re.compile(
     r'\$(SetIO|Execute,"(Tool \d|TLSet \d))|write_command (SELECT|WRITE|OWNER)|[A-Z]'
 )

@@ -44,6 +44,9 @@ _STATIC: Final = {
     "panel.js": "text/javascript; charset=utf-8",
     "panel.svg": "image/svg+xml",
 }
+LATE_AFTER_MS: Final = 1500.0
+"""Age of a press in ms from which it does nothing. A page is grey after 1000."""
+
 _ID: Final = 12
 """Digits of a tablet's id that go on record."""
 
@@ -263,6 +266,10 @@ class Panel:
         facts = {"tablet": tablet.id[:_ID], "who": tablet.who, "action": action, "value": value}
         board = self.hub.boards.get(live.cell)
         job = board.job if board is not None else None
+        if self._is_late(frame):
+            self._note("refused", live.cell, why="late", **facts)
+            with speaking_in(self._tastes.of(tablet.id).language):
+                return tr("The press came too late. Nothing was done. Press again.")
         if board is None or job is None or frame.get("number") != board.number:
             self._note("refused", live.cell, why="number", **facts)
             with speaking_in(self._tastes.of(tablet.id).language):
@@ -276,6 +283,11 @@ class Panel:
         job.press(board.question(), action, value)
         return ""
 
+    def _is_late(self, frame: Mapping[str, Any]) -> bool:
+        """Return whether what a finger did was sent long ago: its cable was out meanwhile."""
+        at_ms = frame.get("at_ms")
+        return at_ms is not None and self._stops.age_ms(None, at_ms) > LATE_AFTER_MS
+
     def _held(self, socket: WebSocket, live: LivePage, what: str, frame: Mapping[str, Any]) -> None:
         """Pass a finger on a key that repeats on to the job."""
         board, finger = self.hub.boards.get(live.cell), _text(frame.get("finger"))
@@ -283,6 +295,8 @@ class Panel:
         if board is None or job is None or not finger:
             return
         if what == "release":
+            job.release(finger)
+        elif self._is_late(frame):
             job.release(finger)
         elif what == "beat":
             job.beat(finger)

@@ -119,6 +119,26 @@ def test_who_planted_the_tablets_cookie_does_not_share_the_login(panel):
         assert stream.ask(t="press", number=1, action="start")["t"] == "refused"
 
 
+def test_the_cookie_of_a_login_is_worth_nothing_on_another_tablet(panel):
+    victim, thief = panel.browser().load(), panel.browser().load()
+    victim.log_in()
+    thief.jar |= {key: value for key, value in victim.jar.items() if "login" in key}
+    assert thief.post("/seat", {"cell": CELL}).status == 403
+    assert victim.post("/seat", {"cell": CELL}).status == 200
+
+
+def test_a_tablet_that_was_removed_stops_nothing_by_the_stream_that_it_still_has(far_panel):
+    browser = far(far_panel)
+    browser.pair()
+    with browser.live() as stream:
+        assert stream.ask(t="stop", press="1")["t"] == "carried out"
+        (tablet,) = far_panel.access.tablets.all()
+        far_panel.access.tablets.forget(tablet.id)
+        stream.send(t="stop", press="2")
+        assert stream.closed() == 4003
+    assert [frame["press"] for frame in far_panel.frames] == ["1"]
+
+
 def test_pairing_draws_a_new_secret(panel):
     browser = panel.browser().load()
     before = dict(browser.jar)
@@ -191,7 +211,9 @@ def test_a_login_that_was_ended_does_not_come_back_with_its_cookie(panel):
     assert browser.post("/logout").status == 200
     browser.jar = dict(kept)
     assert browser.post("/seat", {"cell": CELL}).status == 403
-    # Nor does an older one, when there is a newer.
+    # Nor does one that another has followed.
     browser.log_in()
+    kept = dict(browser.jar)
+    browser.log_in(JON)
     browser.jar = dict(kept)
     assert browser.post("/seat", {"cell": CELL}).status == 403

@@ -190,7 +190,9 @@ def test_the_stored_pin_is_none(tmp_path, monkeypatch):
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
     assert json.loads(path.read_text())["n"] == 16_384
     assert pins.matches(MEI, PINS[MEI])
-    assert not pins.matches(JON, PINS[MEI])  # the file of one is not that of another
+    assert not pins.matches(JON, PINS[MEI])
+    pins._path(JON).write_bytes(path.read_bytes())  # the file of one is not that of another
+    assert not pins.matches(JON, PINS[MEI])
 
 
 @pytest.mark.parametrize(

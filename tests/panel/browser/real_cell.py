@@ -43,7 +43,8 @@ class RealCell:
             Pins().set(name, Secret(pin))
         self.simulator = EpsonSimulator(seed=7)
         self.eyes = InProcessEyes(self.simulator)
-        self.process, self.url, self.port = None, "", 0
+        self.process: subprocess.Popen[bytes] | None = None
+        self.url, self.port = "", 0
 
     def __enter__(self):
         clock = ScaledClock(self._speed)
@@ -84,9 +85,12 @@ class RealCell:
 
     def end(self, how):
         """End the panel by a signal."""
-        self.process.send_signal(how)
-        self.process.wait(30)
-        self.process.stdout.close()
+        process = self.process
+        assert process is not None
+        assert process.stdout is not None
+        process.send_signal(how)
+        process.wait(30)
+        process.stdout.close()
 
     def renew(self):
         """End the panel with its jobs, and start it again."""

@@ -325,7 +325,7 @@ def _chinese(said):
         return WORDS.get(said, said)
     if isinstance(said, tuple):
         return tuple(map(_chinese, said))
-    if is_dataclass(said):
+    if is_dataclass(said) and not isinstance(said, type):
         return replace(
             said, **{one.name: _chinese(getattr(said, one.name)) for one in fields(said)}
         )

@@ -162,7 +162,8 @@ class ScriptedPanel:
 
     async def _tell(self, socket, news):
         await socket.send_json({"t": "hello", "server": self.server, "token": "T"})
-        shown, number = {}, None
+        shown: dict[str, str] = {}
+        number = None
         while socket.client_state is WebSocketState.CONNECTED:
             news.clear()
             if not self.frozen:
@@ -173,7 +174,10 @@ class ScriptedPanel:
                     await socket.send_json(
                         {"t": "screen", "screen": parts.screen, "number": number, "parts": changed}
                     )
-                await socket.send_json({"t": "beat", "age_ms": self.age_ms, "status": {}})
+                at_ms = round(1000 * time.monotonic())
+                await socket.send_json(
+                    {"t": "beat", "age_ms": self.age_ms, "status": {}, "at_ms": at_ms}
+                )
             try:
                 await asyncio.wait_for(news.wait(), 0.2)
             except TimeoutError:

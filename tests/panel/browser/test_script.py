@@ -180,10 +180,11 @@ def test_what_was_typed_stays_with_its_question_and_no_longer(panel, page, finge
     panel.show(values)
     page.wait_for_selector("[data-typed=tool]")
     fingers.tap('[data-key="1"]')
-    panel.show(replace(values, heard=("Told meanwhile.",)))
+    told = replace(values, body=replace(values.body, taught=("Told meanwhile.",)))
+    panel.show(told)
     page.wait_for_selector("text=Told meanwhile.")
     assert page.input_value("[data-typed=tool]") == "1"
-    panel.show(replace(values, heard=("Told meanwhile.",), number=values.number + 1))
+    panel.show(replace(told, number=values.number + 1))
     until(lambda: page.input_value("[data-typed=tool]") == "")
 
 
@@ -323,7 +324,12 @@ def test_a_held_key_ends_where_the_page_was_stuck(panel, page, fingers):
 
 def test_a_held_key_ends_with_a_question_of_the_browser(panel, page, fingers):
     hold(panel, fingers)
-    page.on("dialog", lambda dialog: (time.sleep(1.2), dialog.accept()))
+
+    def answer(dialog):
+        time.sleep(1.2)
+        dialog.accept()
+
+    page.on("dialog", answer)
     page.evaluate("alert('?')")
     assert has_ended(panel)
 
@@ -516,6 +522,18 @@ def test_a_stop_is_not_said_for_ever(panel, page, fingers):
     assert max(one["age_ms"] for one in panel.of("stop")) < 5000
     count = len(panel.of("stop"))
     assert len(still(panel, "stop", 1.0)) == count
+
+
+def test_who_presses_where_it_says_not_stopped_presses_stop(panel, page, fingers):
+    panel.answers = "failed"
+    fingers.tap("#stop")
+    page.wait_for_selector("#unstopped:visible")
+    fingers.tap("#unstopped .huge")
+    until(lambda: len({one["press"] for one in panel.of("stop")}) == 2)
+    assert page.is_visible("#unstopped")
+    fingers.tap("#unstopped [data-close]")
+    page.wait_for_selector("#unstopped", state="hidden")
+    assert len({one["press"] for one in panel.of("stop")}) == 2
 
 
 @pytest.mark.parametrize("outcome", ["failed", "old"])

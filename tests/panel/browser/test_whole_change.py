@@ -2,9 +2,14 @@
 
 import re
 import signal
+import sys
+import threading
 import time
+from contextlib import ExitStack, contextmanager
 
 import pytest
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from tests.panel.browser.fingers import Fingers
 from tests.panel.browser.person import Person
@@ -174,6 +179,22 @@ def test_a_cable_that_is_out_and_back(cell, wired, cable):
     person.jogs("z+", 0.1)
 
 
+def test_a_press_that_the_cable_held_back_does_nothing_when_it_is_back(cell, wired, cable):
+    """For the first second the page does not know that its cable is out."""
+    page = wired.new_page()
+    person = at_touch(page, cell)
+    at, before = person.fingers.middle('[data-action=jog][data-value^="z+"]'), cell.tip_mm()
+    cable.out = True
+    time.sleep(0.2)
+    person.fingers.tap(at)
+    assert page.locator("body.silent").count() == 0
+    time.sleep(4.0)
+    cable.out = False
+    alive(page)
+    time.sleep(2.0)
+    assert cell.tip_mm() == before
+
+
 def test_a_held_key_makes_one_step_at_most_after_the_cable_is_out(cell, wired, cable):
     page = wired.new_page()
     person = at_touch(page, cell)
@@ -279,3 +300,39 @@ def test_stop_in_a_movement_reaches_the_robot_and_is_confirmed(cell, tablet):
     person.fingers.up()
     # The old value counts again: what was written was not proved.
     page.wait_for_selector(".ended.bad, body[data-screen=idle]", timeout=30_000)
+
+
+def test_stop_is_as_fast_with_twenty_tablets(cell, tablet):
+    """From the finger to the ``$Abort`` on the wire of the robot, which stands still."""
+    page = tablet.new_page()
+    page.goto(f"{cell.url}cell/line3")
+    alive(page)
+    fingers, took_ms = Fingers(page), []
+    with ExitStack() as stack:
+        for _ in range(19):
+            stack.enter_context(watching(cell))
+        for _ in range(20):
+            count, at_s = len(cell.relay.aborts), time.monotonic()
+            fingers.down("#stop")
+            until(lambda count=count: len(cell.relay.aborts) > count)
+            took_ms.append(1000 * (cell.relay.aborts[count] - at_s))
+            page.wait_for_selector("#stopped:visible")
+            fingers.up()
+            page.evaluate("document.getElementById('stopped').hidden = true")
+            time.sleep(0.3)
+    took_ms.sort()
+    figures = f"median {took_ms[10]:.0f} ms, worst {took_ms[-1]:.0f} ms"
+    sys.stdout.write(f"STOP to $Abort, 20 tablets, n = 20: {figures}\n")
+    assert took_ms[10] < 250
+    assert took_ms[-1] < 1000
+
+
+@contextmanager
+def watching(cell):
+    """A tablet that watches, without a browser: it reads all that comes."""
+    place = cell.url.removeprefix("http").rstrip("/")
+    with connect(f"ws{place}/live?cell=line3", origin=Origin(f"http{place}")) as socket:
+        reads = threading.Thread(target=lambda: [None for _ in socket], daemon=True)
+        reads.start()
+        yield
+    reads.join(5)

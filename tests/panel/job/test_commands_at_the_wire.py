@@ -1,7 +1,5 @@
 """Other commands at the wire: what they ask becomes a view, what they print is their end."""
 
-from dataclasses import replace
-
 import pytest
 from robolink_cli import main
 from robolink_cli.wizard.views.records import (
@@ -129,17 +127,6 @@ def test_a_station_is_learnt_by_hand_at_the_wire(robot):
     assert main.run(["-c", url, "cell", "station", "show", "PIN-09"]) == 0
 
 
-def test_a_tool_is_calibrated_by_hand_at_the_wire(robot):
-    simulator, _, url = robot
-    tip = simulator.world.tips[1]
-    simulator.world.tips[1] = replace(tip, x_mm=tip.x_mm + 0.31, y_mm=tip.y_mm - 0.22)
-    words = ["calibrate", "two-pose", "--tool", "1"]
-    code, end, seen = through(["-c", url, *words], eyes=InProcessEyes(simulator))
-    assert (code, end.done) == (0, True), end
-    assert any(isinstance(one, ValuesView) for one in seen)
-    assert "Tool 1" in lines_of(end)
-
-
 def test_a_check_of_a_cell_tells_its_findings(robot, tmp_path, monkeypatch):
     _, _, url = robot
     monkeypatch.chdir(tmp_path)
@@ -148,6 +135,30 @@ def test_a_check_of_a_cell_tells_its_findings(robot, tmp_path, monkeypatch):
     assert code in (0, 1)
     assert end.done
     assert "line3" in lines_of(end)
+
+
+def test_a_job_that_was_refused_may_be_begun_again_from_its_last_screen(robot):
+    simulator, _, url = robot
+    numbers = []
+
+    def script(tablet):
+        simulator.machine.motors_on = False
+        end = tablet.body(EndView)
+        assert "otors" in lines_of(end)
+        numbers.append(tablet.view.number)
+        simulator.machine.motors_on = True
+        tablet.press("begin_again")
+        tablet.body(QuestionView)
+        numbers.append(tablet.view.number)
+        tablet.press("no")
+        tablet.body(EndView)
+        numbers.append(tablet.view.number)
+        tablet.press("leave")
+
+    simulator.machine.motors_on = False
+    code, _ = at_the_wire(["-c", url, "robot", "jog", "--keys"], script)
+    assert code == 9
+    assert numbers == sorted(set(numbers)), "no number comes twice"
 
 
 def test_nothing_more_is_asked_of_a_command_that_only_looks(robot):

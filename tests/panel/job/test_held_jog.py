@@ -112,7 +112,7 @@ EVENTS = st.tuples(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(EVENTS, max_size=30))
 def test_whatever_comes_a_key_is_held_only_within_the_lease_of_a_finger_never_lost(events):
     lease, now_s, lost = JogLease(), 0.0, set()

@@ -141,25 +141,24 @@ VALUES = ["", "1", "2", "3", "mounted", "x+0.1", "y-5", "0.1", "n", "y", "q", "d
 @pytest.mark.parametrize("screen", SCREENS)
 @pytest.mark.parametrize("number", [-1, 1, 999])
 def test_a_press_for_another_screen_does_nothing_and_says_so(screen, number):
+    hand = SCREENS[screen]()
+    before, other = hand.state, shown(hand).number + number
     for action, value in itertools.product(ACTIONS, VALUES):
-        hand = SCREENS[screen]()
-        other = shown(hand).number + number
-        before = hand.state
         assert press(hand, action, value, other) == [], (action, value)
-        said, hand.state = hand.state.message, hand.state.says(before.message)
-        assert said
+        assert hand.state.message
+        hand.state = hand.state.says(before.message)
         assert hand.state == before
 
 
 @pytest.mark.parametrize("screen", SCREENS)
 def test_what_a_screen_does_not_offer_does_nothing_and_says_so(screen):
-    view = shown(SCREENS[screen]())
+    hand = SCREENS[screen]()
+    before, view = hand.state, shown(hand)
     offered = {one.name for one in view.actions} | {"choose", "confirm", "jog", "size", "turn"}
-    for action in set(ACTIONS) - offered:
-        for value in VALUES:
-            hand = SCREENS[screen]()
-            assert press(hand, action, value) == []
-            assert hand.state.message
+    for action, value in itertools.product(set(ACTIONS) - offered, VALUES):
+        assert press(hand, action, value) == []
+        assert hand.state.message
+        hand.state = before
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ PLAIN = {
     NoneType: st.none(),
 }
 VIEWS = values_of(View)
-FEW = settings(max_examples=60, deadline=None)
+FEW = settings(max_examples=25, deadline=None)
 
 
 def plain(view):

@@ -7,11 +7,16 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import closing, suppress
+from dataclasses import replace
 
 import pytest
 from robolink_cli import main
+from robolink_cli.wizard.faces.link import WireLink
+from robolink_cli.wizard.faces.wire import WireFace
 from robolink_cli.wizard.happenings import HeldBack, WasRegarded
 from robolink_cli.wizard.screens.screen import screen_of
+from robolink_cli.wizard.state import LastScreen
 from robolink_cli.wizard.views.records import (
     ChoiceView,
     EndView,
@@ -20,6 +25,7 @@ from robolink_cli.wizard.views.records import (
     TouchView,
 )
 from robolink_cli.wizard.views.view import view_of
+from robolink_cli.wizard.views.wire import from_wire
 
 from robolink.model import Path, Pose
 from robolink.runner import MoveSubject
@@ -63,6 +69,21 @@ def line3(robot, tmp_path, monkeypatch):
 
     write()
     return write
+
+
+def started(url, words):
+    """Start a job in a process of its own; return the process and its tablet."""
+    ours, theirs = socket.socketpair()
+    theirs.set_inheritable(True)
+    child = subprocess.Popen(
+        [sys.executable, "-m", "robolink_cli.job_process", str(theirs.fileno()), "-c", url, *words],
+        pass_fds=(theirs.fileno(),),
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+    )
+    theirs.close()
+    return child, Tablet(ours)
 
 
 GARBAGE = [
@@ -166,6 +187,47 @@ def test_whoever_does_not_read_any_more_counts_as_gone(robot, monkeypatch):
 
 
 IN_REAL_TIME = pytest.mark.parametrize("robot", [1.0], indirect=True)
+
+
+def said_by(state):
+    """Show a state on a wire; return what was sent."""
+    ours, theirs = socket.socketpair()
+    ours.setblocking(False)
+    link = WireLink(theirs)
+    face = WireFace(link)
+    face._state = state
+    data = b""
+    with ours, closing(link):
+        face._show()
+        with suppress(BlockingIOError):
+            while not data.endswith(b"\n"):
+                data += ours.recv(1 << 16)
+    return data
+
+
+def test_what_is_too_long_for_a_line_is_cut_and_says_so():
+    told = tuple(f"{number} " + "\u8fd9" * 90 for number in range(2000))
+    ended = LastScreen(True, told, (), 1.0, "DONE")
+    line = said_by(replace(Sitting().state, ended=ended))
+    assert 20_000 < len(line) <= 64 * 1024
+    body = from_wire(json.loads(line)["view"]).body
+    assert isinstance(body, EndView)
+    assert body.lines[0] == told[0]
+    assert "too long" in body.lines[-1]
+    assert body.done
+
+
+def test_what_no_cutting_makes_short_enough_is_not_sent_at_all():
+    header = replace(Sitting().state.header, cell="c" * 70_000)
+    assert b"too long" in said_by(replace(Sitting().state, remarks=("r" * 70_000,)))
+    assert said_by(replace(Sitting().state, header=header)) == b""
+
+
+def test_what_a_terminal_would_obey_is_shown_as_an_escape():
+    ended = LastScreen(True, ("\x1b[2J\u202eevil\udc80",), (), 1.0, "DONE")
+    body = from_wire(json.loads(said_by(replace(Sitting().state, ended=ended)))["view"]).body
+    assert isinstance(body, EndView)
+    assert body.lines == ("\\x1b[2J\\u202eevil?",)
 
 
 @IN_REAL_TIME
@@ -309,20 +371,21 @@ def test_a_cell_may_have_the_robot_stopped_when_its_page_is_silent(robot, line3,
     assert again == (10 if stops else 0), "a stop is released by a person alone"
 
 
+def test_a_child_that_is_terminated_ends_in_order_and_waits_for_nobody(robot):
+    child, tablet = started(robot[2], JOG)
+    tablet.body(QuestionView)
+    os.kill(child.pid, signal.SIGTERM)
+    assert tablet.ends()["code"] == 143
+    assert child.wait(10.0) == 143
+    assert isinstance(tablet.view.body, EndView)
+    assert main.run(["-c", robot[2], "status"]) == 0
+    tablet.close()
+
+
 @IN_REAL_TIME
 def test_a_child_that_is_killed_leaves_what_recover_settles(robot):
     simulator, _, url = robot
-    ours, theirs = socket.socketpair()
-    theirs.set_inheritable(True)
-    child = subprocess.Popen(
-        [sys.executable, "-m", "robolink_cli.job_process", str(theirs.fileno()), "-c", url, *TURN],
-        pass_fds=(theirs.fileno(),),
-        stdin=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-    )
-    theirs.close()
-    tablet = Tablet(ours)
+    child, tablet = started(url, TURN)
     tablet.body(QuestionView)
     tablet.press("yes")
     wait_for(lambda: moves(simulator) == 1)

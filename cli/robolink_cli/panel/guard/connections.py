@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from ipaddress import IPv6Address, ip_address, ip_network
 from time import monotonic
 from typing import Any, Final
@@ -44,6 +44,7 @@ Peer = tuple[str, int]
 """Address and port of the far end."""
 
 
+@lru_cache(maxsize=1024)
 def network_of(address: str) -> str:
     """Return what stands for whoever has an address; of IPv6, its network of 64 bits."""
     try:

@@ -15,8 +15,8 @@ const page = document.body, data = page.dataset, live = "live" in data;
 const now = () => performance.now();
 const identity = () => Array.from(crypto.getRandomValues(new Uint8Array(12)), (b) => b.toString(16).padStart(2, "0")).join("");
 
-// The stream. Whatever is heard proves that it lives; a whole screen must have come by it too.
-let socket = null, begun = 0, ended = false, atMs = null, heard = -Infinity, fresh = false, silent = live, tries = 0;
+// The stream. It is fresh when a whole screen, and then the clock of the server, came by it.
+let socket = null, begun = 0, ended = false, atMs = null, heard = -Infinity, shown = false, fresh = false, silent = live, tries = 0;
 let number = Number(data.number), token = data.token, server = "", readAt = null, lived = now(), heardAt = null;
 
 function connect() {
@@ -24,7 +24,7 @@ function connect() {
   const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`;
   begun = now();
   tries += 1;
-  fresh = ended = false;
+  fresh = shown = ended = false;
   const made = new WebSocket(data.cell ? `${address}?cell=${encodeURIComponent(data.cell)}` : address);
   socket = made;
   made.onmessage = (event) => { if (made === socket) hear(JSON.parse(event.data)); };
@@ -53,7 +53,7 @@ function hear(frame) {
     server = frame.server;
   } else if (frame.t === "screen") {
     put(frame);
-    fresh = true;
+    shown = true;
   } else if (frame.t === "beat") {
     atMs = typeof frame.at_ms === "number" ? {server: frame.at_ms, now: now(), date: Date.now()} : null;
     readAt = typeof frame.age_ms === "number" ? now() - frame.age_ms : null;
@@ -153,7 +153,7 @@ function pressOf(button, pointer) {
 }
 
 const inside = (box, event) => event.clientX >= box.left && event.clientX <= box.right && event.clientY >= box.top && event.clientY <= box.bottom;
-const isOff = (button) => button.getAttribute("aria-disabled") === "true" || (silent && button.id !== "more");
+const isOff = (button) => button.getAttribute("aria-disabled") === "true" || (silent && button.id !== "more" && !("close" in button.dataset));
 
 function down(event) {
   if (event.target.closest("#stop")) {
@@ -164,6 +164,7 @@ function down(event) {
     if (event.button === 0) stop();
     return;
   }
+  look(); // what is silent is known by now, not by the last round
   const slept = asleep || now() - touched > SLEEP_MS;
   touched = now();
   if (slept) { asleep = false; woken = now(); look(); }
@@ -171,7 +172,11 @@ function down(event) {
   stayAwake();
   if (press || held) { drop(); return; } // a second finger
   const over = event.target.closest(".over");
-  if (over && !event.target.closest("a")) { if (over.id !== "lost") over.hidden = true; return; }
+  if (over && !event.target.closest(".b")) {
+    if (over.id === "unstopped") stop();
+    else if (over.id !== "lost") over.hidden = true;
+    return;
+  }
   const button = event.target.closest(PRESSED);
   if (!button || isOff(button) || event.button !== 0) return;
   press = pressOf(button, event.pointerId);
@@ -206,15 +211,19 @@ function act(done) {
     const main = place("main");
     main.scrollTo({top: isAtEnd(main) ? 0 : main.scrollTop + 0.8 * main.clientHeight});
   }
+  else if (what.close) place(what.close).hidden = true;
   else if (href) location.assign(href);
   else if (what.key) { if (done.number === number) type(what.key); }
   else if (what.pick) pick(done);
   else if (what.post) post(done);
   else if (what.action) {
     const value = what.field ? typed(what.field) : what.value;
-    if (!send({t: "press", number: done.number, action: what.action, value, press: identity()})) unheard();
+    if (!send({t: "press", number: done.number, action: what.action, value, press: identity(), ...byServer(now())})) unheard();
   }
 }
+
+// A moment by the clock of the server: what was sent before a cable came out is late when it arrives.
+const byServer = (moment) => (atMs === null ? {} : {at_ms: Math.round(atMs + moment)});
 
 const typed = (name) => document.querySelector(`[data-typed="${name}"]`)?.value ?? "";
 
@@ -261,14 +270,14 @@ const unheard = () => note(place("note").querySelector("[data-why]").dataset.unh
 function hold() {
   if (!press || silent) return;
   const finger = identity();
-  if (!send({t: "hold", number: press.number, axis: press.what.hold, finger})) { unheard(); drop(); return; }
+  if (!send({t: "hold", number: press.number, axis: press.what.hold, finger, ...byServer(now())})) { unheard(); drop(); return; }
   held = {finger, last: now(), timer: setInterval(beat, BEAT_MS)};
 }
 
 function beat() {
   const late = now() - held.last > LEASE_MS; // the page was stuck: who knows where the finger is
   held.last = now();
-  if (late || !send({t: "beat", finger: held.finger})) drop();
+  if (late || !send({t: "beat", finger: held.finger, ...byServer(now())})) drop();
 }
 
 function release() {

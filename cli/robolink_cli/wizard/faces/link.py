@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Final
 
+from robolink_cli.console.output import visible
 from robolink_cli.wizard.happenings import Pressed
 from robolink_cli.wizard.lease import Hold, JogLease
 
@@ -29,6 +30,19 @@ _PATIENCE_S: Final = 5.0
 """Time in seconds after which whoever does not read any more counts as gone."""
 
 _LONGEST_WORD: Final = 200
+
+
+def _visible(value: object) -> object:
+    """Return what is sent with each control character as an escape, like on a terminal."""
+    match value:
+        case str():
+            return visible(value)
+        case dict():
+            return {key: _visible(one) for key, one in value.items()}
+        case list() | tuple():
+            return [_visible(one) for one in value]
+        case _:
+            return value
 
 
 class WireLink:
@@ -87,7 +101,8 @@ class WireLink:
 
         Who does not read for a time counts as gone, so that nothing waits for them for ever.
         """
-        data = json.dumps(line, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+        text = json.dumps(_visible(line), ensure_ascii=False, allow_nan=False)
+        data = text.encode("utf-8", "replace") + b"\n"
         if len(data) > LONGEST_LINE:
             return False
         with self._sending:

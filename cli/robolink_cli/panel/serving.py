@@ -16,10 +16,11 @@ from robolink.errors import ConnectError
 from robolink.locale.languages import ENGLISH
 from robolink.messages import tr
 from robolink_cli.panel.app import Panel
+from robolink_cli.panel.board import PanelCell
 from robolink_cli.panel.guard.access import Access, Notes, People
 from robolink_cli.panel.guard.connections import Connections, listening
 from robolink_cli.panel.guard.gate import guarded
-from robolink_cli.panel.hub import Hub, PanelCell
+from robolink_cli.panel.hub import Hub
 from robolink_cli.panel.pages import Pages
 from robolink_cli.panel.stop import StopDesk, StopProcess
 from robolink_cli.panel.tastes import Tastes

@@ -406,12 +406,34 @@ def _like_s(
         longest_mm, seconds = max(lengths)
         along_s = seconds + (length_mm - longest_mm) / speed_mm_s
     around_s = _between(turns, turn_deg, _ALIKE_DEG)
+    if around_s is None and path is Path.JOINT:
+        around_s = _further(turns, turn_deg)
     if along_s is None and around_s is not None:
         # A way as long that took no longer than this turn shows that the turn takes longer.
         most_s = around_s * (1 + _ALIKE)
-        shown = (mm * (1 + _ALIKE) >= length_mm and seconds <= most_s for mm, _, seconds in own)
+        least_mm = length_mm - max(_ALIKE_MM, _ALIKE * length_mm)
+        shown = (mm >= least_mm and seconds <= most_s for mm, _, seconds in own)
         along_s = 0.0 if any(shown) else None
     return None if along_s is None or around_s is None else max(along_s, around_s)
+
+
+def _further(turns: Sequence[tuple[float, float]], turn_deg: float) -> float | None:
+    """Return the seconds of a turn beyond the known ones, by how they grow from one to the next.
+
+    Two are needed that differ by half, and none is followed farther than three times the largest.
+    """
+    if not turns:
+        return None
+    largest_deg, most_s = max(turns)
+    smaller = [one for one in turns if one[0] <= _HALF_OF_IT * largest_deg]
+    if not smaller or turn_deg > _FARTHEST_TIMES * largest_deg:
+        return None
+    smaller_deg, less_s = max(smaller)
+    return most_s + (turn_deg - largest_deg) * (most_s - less_s) / (largest_deg - smaller_deg)
+
+
+_HALF_OF_IT: Final = 0.5
+_FARTHEST_TIMES: Final = 3.0
 
 
 def _between(points: Iterable[tuple[float, float]], at: float, alike: float) -> float | None:

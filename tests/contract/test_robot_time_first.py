@@ -83,7 +83,7 @@ def test_moves_of_another_recipe_tell_how_fast_joints_are(tmp_path):
         other = edited(cell, tmp_path, ("lift_mm = 10", "lift_mm = 12"))
         said = other.change("--dry-run", "--json").document["robot_time"]
         assert (said["earlier_runs"], said["changed"]) == (0, True)
-        assert said["moves_left_out"] <= 1
+        assert said["moves_left_out"] == 0
         assert first["about_s"] + 4 < said["about_s"] == pytest.approx(took_s, rel=0.2)
 
 

@@ -7,7 +7,7 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.calibration_run import ChangePlan, Limits, NozzleChange, PlannedStep, ToolPlan
-from robolink.calibration_run._forecast import RunForecaster, RunTimes
+from robolink.calibration_run._forecast import RunForecaster, RunTimes, _like_s
 from robolink.controllers import SimpleController
 from robolink.journal import memory_journal
 from robolink.methods import PointsSource
@@ -191,3 +191,23 @@ def test_a_measurement_that_is_made_again_makes_a_run_unusual():
         )
         change.run(write=False)
     assert not time.usual
+
+
+def like_s(turn_deg, length_mm=0.0, path=Path.JOINT):
+    """How long a turn takes by two others, of which the larger one led 30 mm far."""
+    moves = [("joint", 0.0, 10.0, 0.4), ("joint", 30.0, 40.0, 0.8)]
+    return _like_s(moves, path, (length_mm, turn_deg), 20.0)
+
+
+def test_a_larger_turn_is_followed_from_two_that_differ():
+    assert like_s(25) == pytest.approx(0.6)
+    assert like_s(100) == pytest.approx(0.8 + 60 * 0.4 / 30)
+    assert like_s(121) is None
+    assert like_s(100, path=Path.STRAIGHT) is None
+    assert _like_s([("joint", 0.0, 40.0, 0.8)], Path.JOINT, (0.0, 100.0), 20.0) is None
+
+
+def test_a_way_beside_a_turn_counts_only_if_none_as_long_took_less():
+    assert like_s(40, length_mm=30) == pytest.approx(0.8)
+    assert like_s(40, length_mm=50) is None
+    assert like_s(10, length_mm=30) is None

@@ -396,23 +396,30 @@ def test_simulated_is_only_what_the_last_reader_was_told(hub):
     board = hub.boards["line3"]
     simulated = {**READY, "controller": "epson:C-SIM0A1B2C3D/SIM0A1B2C3D"}
     held = {**READY, "controller": CELL.url, "held_by": "ann"}
+    nameless = {**READY, "controller": CELL.url}
+    plc = {**READY, "controller": "softmotion:1A"}
     for read, shown in (
         (None, False),
         (simulated, True),
         (None, True),  # a job has ended, and the next look is under way
         (held, True),
-        (READY, False),
-        ({**READY, "simulated": True}, True),
+        (nameless, True),
+        ({**nameless, "controller": "epson:C-T60A1B2C3D/T6"}, False),
+        ({**plc, "simulated": True}, True),
+        ({**plc, "simulated": False}, False),
     ):
         board.watch.look = None if read is None else CellLook(50.0, AT, read)
         assert board.simulated is shown, read
     board.watch.look = CellLook(50.0, AT, failed="no route")
     assert not board.simulated, "what does not answer may be another"
-    board.watch.look = CellLook(50.0, AT, simulated)
-    assert board.simulated
+    board.watch.look = CellLook(50.0, AT, nameless)
+    board.standing = Standing(simulated=True)
+    assert board.simulated, "a simulator was met there last"
     board.job = FakeJob()
     board.job.view = view(1)
     assert not board.simulated, "the job is connected to a real one"
+    board.job = None
+    assert not board.simulated, "the record outweighs a job that was connected since"
 
 
 def test_no_age_is_told_where_nothing_was_read(hub):

@@ -185,7 +185,8 @@ def _invoke(arguments: Sequence[str]) -> int:
     from robolink_cli.wizard.host import whole_command
     from robolink_cli.wizard.state import Header
 
-    return whole_command(Header("", " ".join(arguments[:1])), lambda: _carried_out(arguments))
+    # Who began it calls it by its name until the command itself knows better.
+    return whole_command(Header("", ""), lambda: _carried_out(arguments))
 
 
 def _carried_out(arguments: Sequence[str]) -> int:

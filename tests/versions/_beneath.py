@@ -29,7 +29,7 @@ REASONS: Final[Mapping[str, str]] = {
     "python-can": "4.2 imports pkg_resources, which an environment of today need not have",
     "rich": _OLDER,
     "starlette": "1.0 is the first release whose interface is promised to stay",
-    "uvicorn": "of what meets a network, only releases of the last two years are tried",
+    "uvicorn": "the releases beneath take no context of TLS that was made before",
     "websockets": "of what meets a network, only releases of the last two years are tried",
 }
 """Why a lower one was not tried although the tests might pass with it.

@@ -17,6 +17,10 @@ NEVER: Final = ("dev", "browser", "docs")
 PYTHONS: Final = ("3.11", "3.12", "3.13", "3.14")
 """The versions of Python that ``make versions`` looks for, the lowest first."""
 
+UNTRIED: Final = {"newest-3.14": frozenset({"cryptography", "starlette", "uvicorn", "websockets"})}
+"""Packages that a run has not had yet: the panel came after it, and the machine had no such Python.
+"""
+
 _CLASSIFIER: Final = "Programming Language :: Python :: 3."
 
 

@@ -22,13 +22,14 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from robolink.errors import RobolinkError
 from robolink.locale.languages import language_named
 from robolink.messages import in_english, tr
+from robolink_cli.panel.board import may_begin
 from robolink_cli.panel.cards import ChangeRow, ChartCard
 from robolink_cli.panel.guard.access import Access
 from robolink_cli.panel.guard.live import ANYTIME
 from robolink_cli.panel.guard.pairing import Tablet
 from robolink_cli.panel.guard.requests import MOST_BYTES, parsed
 from robolink_cli.panel.history import changes_of, charts_of, page_of
-from robolink_cli.panel.hub import Hub, LivePage, may_begin
+from robolink_cli.panel.hub import Hub, LivePage
 from robolink_cli.panel.jobs import KINDS, end_all, options_of
 from robolink_cli.panel.pages import HERE, Pages, Watcher
 from robolink_cli.panel.stop import StopAnswer, StopAsked, StopDesk
@@ -165,6 +166,7 @@ class Panel:
                 cell=board.name,
                 changes=changes,
                 charts=charts,
+                simulated=board.simulated or board.standing.simulated,
                 token=self._token(request),
             )
         )
@@ -292,9 +294,7 @@ class Panel:
         job = board.job if board is not None else None
         if board is None or job is None or not finger:
             return
-        if what == "release":
-            job.release(finger)
-        elif self._is_late(frame):
+        if what == "release" or self._is_late(frame):
             job.release(finger)
         elif what == "beat":
             job.beat(finger)
@@ -400,6 +400,7 @@ class Panel:
         }
         role = self._access.role(tablet.who, board.name)
         station = board.station(kind, said.get("values"))
+        recipe = board.recipe(kind, said.get("values"))
         why = ""
         if role is None or not may_begin(kind, role):
             why = tr("This takes an engineer.")
@@ -407,6 +408,8 @@ class Panel:
             why = tr("A job is running on this cell already.")
         elif kind.of_station and station is None:
             why = tr("This cell has no such station.")
+        elif kind.of_recipe and _names_a_recipe(said.get("values")) and not recipe:
+            why = tr("This recipe is not offered any more. Choose again.")
         if why:
             self._note("refused", board.name, why=in_english(why), **facts)
             return _refused(why)
@@ -419,6 +422,7 @@ class Panel:
                 who=tablet.who,
                 values=options_of(kind, said.get("values")),
                 station=station,
+                recipe=recipe,
             )
         except OSError as error:
             cause = error.strerror or str(error)
@@ -445,6 +449,10 @@ def _nothing_here() -> Response:
 
 def _refused(why: str) -> Response:
     return JSONResponse({"why": why}, 409)
+
+
+def _names_a_recipe(given: object) -> bool:
+    return isinstance(given, Mapping) and "recipe" in given
 
 
 async def _body(request: Request) -> Mapping[str, Any]:

@@ -38,6 +38,7 @@ class CellCard:
         busy: Whether a job runs.
         seat: Who works on it; empty for nobody.
         jobs: What can be begun.
+        read: Whether the controller was read, so that there is an age to be shown.
     """
 
     name: str
@@ -48,6 +49,7 @@ class CellCard:
     busy: bool = False
     seat: str = ""
     jobs: tuple[JobOffer, ...] = ()
+    read: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from robolink import __version__
-from robolink.drift import KINDS, CellDrift, Chart, drift_of
+from robolink.drift import CellDrift, Chart
 from robolink.errors import ConfigError
-from robolink.journal import Journal, default_location, may_exist, open_journal
+from robolink.journal import Journal, open_journal
 from robolink.messages import tr
-from robolink.methods import all_methods
 from robolink.model import EntryKind, Recorded
 from robolink.report import Report, chart_picture, chart_title, heading, render, reports_of
 from robolink.timing import local_label, wall_time
@@ -20,6 +19,7 @@ from robolink.transaction import id_of_change
 from robolink.transport import parse_url
 from robolink_cli.access.change_page import reports_from
 from robolink_cli.panel.cards import ChangeRow, ChartCard
+from robolink_cli.panel.record import cell_drift, journal_there
 from robolink_cli.views.journal import who
 
 MOST_ROWS: Final = 25
@@ -47,7 +47,7 @@ def changes_of(url: str) -> tuple[ChangeRow, ...]:
     Raises:
         JournalError: The journal cannot be read.
     """
-    journal = _journal()
+    journal = journal_there()
     return () if journal is None else tuple(_rows(journal, parse_url(url).address))
 
 
@@ -61,16 +61,10 @@ def charts_of(url: str, *, striking: bool = False) -> tuple[ChartCard, ...]:
     Raises:
         JournalError: The journal cannot be read.
     """
-    journal = _journal()
+    journal = journal_there()
     if journal is None:
         return ()
-    address = parse_url(url).address
-    entries = sorted(
-        journal.entries(controller=address, kinds=KINDS, newest_first=False),
-        key=lambda entry: entry.number,
-    )
-    finding = {method.name for method in all_methods() if method.needs.finds_pin}
-    cell = drift_of(address, entries, finds_pin=finding.__contains__)
+    cell = cell_drift(journal, parse_url(url).address)
     cards = [_card(cell, chart) for chart in cell.charts]
     return tuple(card for card in cards if card.unusual or not striking)
 
@@ -96,11 +90,6 @@ def page_of(url: str, change: str) -> str:
         )
     reports, _ = reports_from(journal, entries)
     return render(*reports)
-
-
-def _journal() -> Journal | None:
-    """Return the journal, ``None`` where there is none yet."""
-    return open_journal(read_only=True) if may_exist(default_location()) else None
 
 
 def _rows(journal: Journal, address: str) -> Iterator[ChangeRow]:

@@ -10,19 +10,21 @@ import secrets
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
 from robolink.errors import RobolinkError
-from robolink.messages import spoken, tr
+from robolink.messages import tr
 from robolink.transport import far_end_of
 from robolink_cli.console.output import show
-from robolink_cli.panel.cards import CellCard, JobOffer
-from robolink_cli.panel.jobs import KINDS, JobKind, PanelJob
+from robolink_cli.panel.board import OVERVIEW_S, Board, PanelCell
+from robolink_cli.panel.cards import CellCard
+from robolink_cli.panel.jobs import JobKind, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
-from robolink_cli.panel.watch import AT_ONCE, CellWatch, Standing, card_of, standing_of
+from robolink_cli.panel.recipes import recipes_of
+from robolink_cli.panel.record import standing_of
+from robolink_cli.panel.watch import AT_ONCE
 from robolink_cli.panel.words import speaking_in
-from robolink_cli.wizard.views.records import MovingView, View
 
 BEAT_S: Final = 0.25
 """Longest time in s without a frame to a tablet."""
@@ -36,11 +38,8 @@ GONE_S: Final = 10.0
 ALIVE_S: Final = 0.5
 """Interval in s at which a job is told that its seat's tablet is heard."""
 
-OVERVIEW_S: Final = 1.0
-"""Interval in s at which the overview is drawn anew while nothing happens."""
-
-_NUMBERS: Final = 1_000_000
-"""Questions of one job; numbers of another job begin behind them."""
+RECORD_S: Final = 10.0
+"""Interval in s at which the record of a cell is read anew while a page shows it."""
 
 
 class SeatHolder(Protocol):
@@ -54,194 +53,16 @@ class SeatHolder(Protocol):
     def who(self) -> str:
         """The person; empty for the panel's own PIN."""
 
+    @property
+    def address(self) -> str:
+        """Where the tablet is."""
+
 
 class SeatTable(Protocol):
     """Who commands which cell."""
 
     def holder(self, cell: str, *, moving: bool | None = None) -> SeatHolder | None:
         """Return who commands a cell, ``None`` for nobody."""
-
-
-@dataclass(frozen=True, slots=True)
-class PanelCell:
-    """A cell that the panel shows.
-
-    Attributes:
-        name: Its name.
-        url: Its controller.
-        watch_s: How often it is looked at; ``None`` for only when a page is opened.
-        simulated: Whether nothing real moves, as far as its URL says.
-        stations: Names of its stations.
-        tool: The tool that works there, with which stations are found; ``None`` where the cell
-            file says none.
-    """
-
-    name: str
-    url: str
-    watch_s: float | None = None
-    simulated: bool = False
-    stations: tuple[str, ...] = ()
-    tool: int | None = None
-
-
-class Board:
-    """One cell: its job, or how it was seen last.
-
-    Args:
-        cell: The cell.
-        changed: Called with it when there is something new to show.
-        slots: Taken for a look, of all cells together.
-    """
-
-    def __init__(
-        self, cell: PanelCell, changed: "Callable[[Board], None]", slots: asyncio.Semaphore
-    ) -> None:
-        self.cell = cell
-        self._changed = changed
-        self.watch = CellWatch(cell.name, cell.url, cell.watch_s, self.renew, slots)
-        self.standing = Standing()
-        self.job: PanelJob | None = None
-        self.said: tuple[str, ...] = ()
-        self.base = (1 + secrets.randbelow(1000)) * _NUMBERS
-        self.opened = False
-        self._drawn: dict[Watcher, Parts] = {}
-        self._drawn_s = 0.0
-
-    @property
-    def name(self) -> str:
-        """The cell's name."""
-        return self.cell.name
-
-    @property
-    def view(self) -> View | None:
-        """What the job shows; ``None`` where no job runs, or it has shown nothing yet."""
-        return self.job.view if self.job is not None else None
-
-    @property
-    def moving(self) -> bool:
-        """Whether a job moves the robot by itself."""
-        view = self.view
-        return view is not None and isinstance(view.body, MovingView)
-
-    @property
-    def number(self) -> int:
-        """The number of the question that is on the screen; no two jobs share one."""
-        return self.base + (self.view.number if self.view is not None else 0)
-
-    def renew(self) -> None:
-        """Forget what was drawn, and tell the tablets."""
-        self._drawn.clear()
-        self._changed(self)
-
-    def next_numbers(self) -> None:
-        """Give what is shown from now on numbers of its own."""
-        self.base += _NUMBERS
-
-    def question(self) -> int:
-        """Return the number that the job itself gives its question."""
-        return self.number - self.base
-
-    def parts(self, pages: Pages, watcher: Watcher, now_s: float) -> Parts:
-        """Return the parts of the cell's page."""
-        if self.job is None and now_s - self._drawn_s > OVERVIEW_S:
-            self._drawn.clear()  # what is said of an idle cell ages
-        if not self._drawn:
-            self._drawn_s = now_s
-        found = self._drawn.get(watcher)
-        if found is None:
-            view = self.view
-            found = (
-                pages.screen(view, watcher)
-                if view is not None
-                else pages.idle(self.card(watcher, now_s), watcher)
-            )
-            self._drawn[watcher] = found
-        return found
-
-    def status(self, now_s: float) -> tuple[int, dict[str, object]]:
-        """Return the age of the last reading in ms, and what it was."""
-        view, job = self.view, self.job
-        if view is not None and view.status is not None and job is not None:
-            status = asdict(view.status)
-            age_s = status.pop("age_s") + (now_s - job.view_s)
-            return round(age_s * 1000), status
-        look = self.watch.look
-        if job is None and look is not None and not look.failed:
-            return round((now_s - look.taken_s) * 1000), {"state": look.state}
-        return 0, {}
-
-    def card(self, watcher: Watcher, now_s: float, *, seat: str = "") -> CellCard:
-        """Return what the overview shows of it."""
-        with speaking_in(watcher.language):
-            if self.job is not None:
-                return self._busy(watcher, self.job, seat)
-            simulated, said = self.cell.simulated, self.said
-            card = card_of(self.watch, self.standing, now_s, simulated=simulated, said=said)
-            return replace(card, seat=seat, jobs=self.offers(watcher))
-
-    def offers(self, watcher: Watcher) -> tuple[JobOffer, ...]:
-        """Return the jobs that can be begun, in the language that is spoken."""
-        found = list[JobOffer]()
-        for kind in filter(self._is_of_use, KINDS.values()):
-            why_not = self._why_not(kind, watcher)
-            if kind.of_station:
-                found += [
-                    JobOffer(
-                        kind.name,
-                        tr("Find the station {station} again", station=station),
-                        values={"station": station},
-                        why_not=why_not,
-                    )
-                    for station in self.cell.stations
-                ]
-            else:
-                found.append(JobOffer(kind.name, spoken(kind.title), why_not=why_not))
-        return tuple(found)
-
-    def station(self, kind: JobKind, given: object) -> tuple[str, int] | None:
-        """Return the station of a job and the tool that finds it; ``None`` where it has none.
-
-        Args:
-            kind: The job.
-            given: ``values`` of the press.
-        """
-        named = given.get("station") if isinstance(given, Mapping) else None
-        if not kind.of_station or self.cell.tool is None or named not in self.cell.stations:
-            return None
-        return str(named), self.cell.tool
-
-    def _is_of_use(self, kind: JobKind) -> bool:
-        if kind.name == "recover":
-            return bool(self.standing.interrupted)
-        if kind.of_station:
-            return self.cell.tool is not None
-        return kind.name != "release" or self.standing.stopped is not None
-
-    def _why_not(self, kind: JobKind, watcher: Watcher) -> str:
-        if self.standing.interrupted and kind.name not in ("recover", "release"):
-            return tr("First finish or undo the interrupted job.")
-        if watcher.role and not may_begin(kind, watcher.role):
-            return tr("This takes an engineer.")
-        return ""
-
-    def _busy(self, watcher: Watcher, job: PanelJob, seat: str) -> CellCard:
-        view = job.view
-        title = spoken(job.kind.title)
-        lines = [title] if view is None else [f"{title}: {view.head.title}"]
-        halted = view is not None and view.status is not None and view.status.halted
-        mark, word = "look", tr("job running")
-        if halted and view is not None and view.status is not None:
-            mark, word = "bad", view.status.state
-        elif self.moving:
-            word = tr("moving")
-        simulated = self.cell.simulated or (view is not None and view.head.simulated)
-        card = CellCard(self.name, mark, word, tuple(lines), simulated=simulated, busy=True)
-        return replace(card, seat=seat or watcher.seat)
-
-
-def may_begin(kind: JobKind, role: str) -> bool:
-    """Return whether somebody with a role may begin a job."""
-    return role == "engineer" or role == kind.role
 
 
 Send = Callable[[Mapping[str, object]], Awaitable[None]]
@@ -312,6 +133,9 @@ class Hub:
 
     def _tend(self, board: Board, now_s: float) -> None:
         job = board.job
+        shown = any(live.cell in ("", board.name) for live in self.lives)
+        if shown and now_s - board.record_s >= RECORD_S:
+            self.spawn(self.read_standing(board))
         if job is None:
             if board.watch.is_due(now_s, wanted=board.opened):
                 board.opened = False
@@ -334,8 +158,12 @@ class Hub:
 
     async def read_standing(self, board: Board) -> None:
         """Read what is on record of a cell."""
-        board.standing = await asyncio.to_thread(standing_of, board.cell.url)
-        board.renew()
+        board.record_s = time.monotonic()
+        cell, before = board.cell, (board.standing, board.recipes)
+        board.standing = await asyncio.to_thread(standing_of, cell.url, board.standing)
+        board.recipes = await asyncio.to_thread(recipes_of, cell.configured)
+        if before != (board.standing, board.recipes):
+            board.renew()
 
     def spawn(self, work: Any) -> None:  # noqa: ANN401 - any coroutine
         """Do something beside, and keep hold of it until it has ended."""
@@ -354,6 +182,7 @@ class Hub:
         who: str,
         values: Mapping[str, str],
         station: tuple[str, int] | None = None,
+        recipe: str = "",
     ) -> None:
         """Begin a job on a cell that has none.
 
@@ -368,6 +197,7 @@ class Hub:
             changed=board.renew,
             values=values,
             station=station,
+            recipe=recipe,
         )
         board.next_numbers()
         board.job, board.said = job, ()
@@ -465,18 +295,22 @@ class Hub:
 
     def cards(self, watcher: Watcher, now_s: float) -> list[CellCard]:
         """Return what the overview shows of each cell."""
-        return [
-            board.card(watcher, now_s, seat=self._who(board.name)) for board in self.boards.values()
-        ]
+        with speaking_in(watcher.language):
+            return [
+                board.card(watcher, now_s, seat=self._who(board.name))
+                for board in self.boards.values()
+            ]
 
     def _who(self, cell: str) -> str:
         holder = self._seats.holder(cell)
-        return "" if holder is None else holder.who
+        if holder is None:
+            return ""
+        return holder.who or tr("the tablet at {address}", address=holder.address)
 
     def beat(self, live: LivePage, now_s: float) -> dict[str, object]:
         """Return the frame that shows that this server is alive."""
         board = self.boards.get(live.cell)
-        age_ms, status = board.status(now_s) if board is not None else (0, {})
+        age_ms, status = board.status(now_s) if board is not None else (None, {})
         return {"t": "beat", "age_ms": age_ms, "status": status}
 
 

@@ -13,12 +13,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from robolink.messages import declared
+from robolink.messages import declared, spoken
 from robolink.model import PersonRole
 from robolink_cli.console.language import VARIABLE
+from robolink_cli.panel.words import speaking_in
 from robolink_cli.wizard.views.records import View
 from robolink_cli.wizard.views.wire import from_wire
 
@@ -46,6 +47,7 @@ class JobKind:
         role: Who may begin it.
         values: The options that may go with it, and for each the option of the command.
         of_station: Whether it is about one station of the cell, which the press names.
+        of_recipe: Whether it follows a recipe, which the press may name.
     """
 
     name: str
@@ -54,14 +56,15 @@ class JobKind:
     role: PersonRole = PersonRole.OPERATOR
     values: Mapping[str, str] = field(default_factory=dict)
     of_station: bool = False
+    of_recipe: bool = False
 
 
 KINDS: Final = {
     kind.name: kind
     for kind in (
-        JobKind("change", declared("Change a needle or nozzle"), ("change",)),
+        JobKind("change", declared("Change a needle or nozzle"), ("change",), of_recipe=True),
         JobKind("recover", declared("Finish or undo the interrupted job"), ("recover",)),
-        JobKind("release", declared("Allow movement again after a stop"), ("robot", "release")),
+        JobKind("release", declared("Allow movement again after a stop."), ("robot", "release")),
         JobKind("check", declared("Check the cell"), ("cell", "check")),
         JobKind("undo", declared("Undo the last tool change"), ("undo",), PersonRole.ENGINEER),
         JobKind(
@@ -107,6 +110,7 @@ class PanelJob:
         changed: Called when there is something new to show.
         values: What goes with the command: options, and their values.
         station: Whose place is found, and with which tool; ``None`` where it is about no station.
+        recipe: File of the recipe; empty where the job lets the person choose.
 
     Attributes:
         view: What it shows; ``None`` before it has shown anything.
@@ -128,11 +132,12 @@ class PanelJob:
         changed: Callable[[], None],
         values: Mapping[str, str] | None = None,
         station: tuple[str, int] | None = None,
+        recipe: str = "",
     ) -> None:
         self.cell, self.kind, self.language, self.who = cell, kind, language, who
         self._changed = changed
         self._values = dict(values or {})
-        self._station = station
+        self._station, self._recipe = station, recipe
         self.view: View | None = None
         self.view_s = time.monotonic()
         self.told: deque[str] = deque(maxlen=_MOST_TOLD)
@@ -157,6 +162,8 @@ class PanelJob:
         if self._station is not None:
             name, tool = self._station
             given += ["--tool", str(tool), "--", name]
+        elif self._recipe:
+            given += ["--", self._recipe]
         return ["-c", self.cell, *who, *self.kind.words, *given]
 
     async def start(self) -> None:
@@ -265,7 +272,7 @@ class PanelJob:
     def _heard(self, said: Mapping[str, Any]) -> None:
         match said["t"]:
             case "view":
-                self.view, self.view_s = from_wire(said["view"]), time.monotonic()
+                self.view, self.view_s = self._named(from_wire(said["view"])), time.monotonic()
             case "told":
                 self.told.append(str(said["text"]))
             case "left":
@@ -273,6 +280,15 @@ class PanelJob:
             case _:
                 return
         self._changed()
+
+    def _named(self, view: View) -> View:
+        """Return a view with cell and job in its head, where the command did not name them yet."""
+        head = view.head
+        if head.cell and head.job:
+            return view
+        with speaking_in(self.language):
+            title = spoken(self.kind.title)
+        return replace(view, head=replace(head, cell=head.cell or self.cell, job=head.job or title))
 
 
 def options_of(kind: JobKind, given: object) -> dict[str, str]:

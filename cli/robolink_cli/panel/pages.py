@@ -159,8 +159,8 @@ class Pages:
             data: For each the ``token`` of the session; ``cell``, and for it ``parts``
                 (:class:`Parts`) and ``number``; ``overview``: ``cells``
                 (:class:`~robolink_cli.panel.cards.CellCard`); ``history``: ``cell``,
-                ``changes`` and ``charts``; ``login`` and ``pairing``: ``names``, and ``onward``,
-                the page that follows.
+                ``changes``, ``charts`` and ``simulated``; ``login`` and ``pairing``: ``names``,
+                and ``onward``, the page that follows.
 
         Raises:
             KeyError: There is no such kind.
@@ -174,6 +174,7 @@ class Pages:
             "onward": "/",
             "names": (),
             "parts": None,
+            "simulated": False,
         }
         given |= data
         given["onward"] = _inside(given["onward"])

@@ -16,10 +16,11 @@ from robolink.errors import ConnectError
 from robolink.locale.languages import ENGLISH
 from robolink.messages import tr
 from robolink_cli.panel.app import Panel
+from robolink_cli.panel.board import PanelCell
 from robolink_cli.panel.guard.access import Access, Notes, People
 from robolink_cli.panel.guard.connections import Connections, listening
 from robolink_cli.panel.guard.gate import guarded
-from robolink_cli.panel.hub import Hub, PanelCell
+from robolink_cli.panel.hub import Hub
 from robolink_cli.panel.pages import Pages
 from robolink_cli.panel.stop import StopDesk, StopProcess
 from robolink_cli.panel.tastes import Tastes
@@ -114,6 +115,7 @@ async def serve(
             lifespan="on",
             log_config=None,
             date_header=False,
+            ws="websockets-sansio",
             timeout_graceful_shutdown=_LAST_ANSWERS_S,
             ssl_certfile=place.certificate or None,
             ssl_keyfile=place.key or None,
@@ -142,7 +144,7 @@ def _listening(place: PanelPlace, connections: Connections) -> socket.socket:
     except OSError as error:
         raise ConnectError(
             tr(
-                "The panel cannot listen at {host}:{port}: {cause}.",
+                "robolink cannot listen at {host}:{port}: {cause}.",
                 host=place.host,
                 port=place.port,
                 cause=error.strerror or error,

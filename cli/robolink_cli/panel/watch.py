@@ -13,21 +13,17 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from robolink.errors import RobolinkError
 from robolink.locale.languages import ENGLISH
 from robolink.messages import declared, spoken, tr
+from robolink.model import is_simulated_name
 from robolink.timing import local_label, wall_label
 from robolink_cli.console.language import VARIABLE
 from robolink_cli.console.shell_words import state_word
 from robolink_cli.panel.cards import CellCard
-
-if TYPE_CHECKING:
-    from robolink.model import Marker
-    from robolink.stopping import StopNote
+from robolink_cli.panel.record import Standing
 
 LEAST_APART_S: Final = 5.0
 """Shortest time in s between two looks at a cell that a page asked for."""
@@ -66,58 +62,19 @@ class CellLook:
         return str(self.read.get("state") or "")
 
     @property
+    def simulated(self) -> bool | None:
+        """Whether the controller says that nothing real moves; ``None`` where it was not read."""
+        if not self.read:
+            return None
+        if is_simulated_name(str(self.read.get("controller", ""))):
+            return True
+        return None if self.read.get("held_by") else self.read.get("simulated") is True
+
+    @property
     def taken_s(self) -> float:
         """When the controller was read, monotonic: by another process it was read before."""
         age = self.read.get("age_s")
         return self.at_s - (float(age) if isinstance(age, (int, float)) else 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """What is on record of a cell, whatever the controller says.
-
-    Attributes:
-        interrupted: Jobs that are open; no other begins before they are settled.
-        stopped: Who stopped it; ``None`` where nobody did, or it was released.
-    """
-
-    interrupted: "tuple[Marker, ...]" = ()
-    stopped: "StopNote | None" = None
-
-    def lines(self) -> tuple[str, ...]:
-        """Return it in sentences, in the language that is spoken."""
-        from robolink.model import begun_in_words
-
-        told = [
-            tr(
-                "Not finished since {when}: {request}.",
-                when=local_label(marker.begun_at),
-                request=begun_in_words(marker),
-            )
-            for marker in self.interrupted
-        ]
-        return (*told, *((self.stopped.sentence,) if self.stopped else ()))
-
-
-def standing_of(url: str) -> Standing:
-    """Return what journal and notes say of a cell; sends nothing.
-
-    What cannot be read is left out: the next job, which needs it, says why.
-    """
-    from robolink.journal import default_location, may_exist, open_journal
-    from robolink.stopping import find_note
-    from robolink.transport import far_end_of, parse_url
-    from robolink_cli.stopping.notes import last_known
-
-    interrupted: tuple[Marker, ...] = ()
-    stopped = None
-    with suppress(RobolinkError, OSError):
-        if may_exist(default_location()):
-            log = open_journal(read_only=True).log(parse_url(url).address)
-            interrupted = log.open_markers()
-    with suppress(RobolinkError, OSError):
-        stopped = find_note(far_end_of(url), last_known(url))
-    return Standing(interrupted, stopped)
 
 
 class CellWatch:
@@ -232,13 +189,16 @@ def card_of(
             mark=_mark(look) if now_s - look.taken_s < STALE_AFTER_S else "unknown",
             word=state_word(look.state) if look.state else tr("not read"),
             lines=_read(look, now_s),
-            simulated=simulated or look.read.get("simulated") is True,
+            read=True,
+            simulated=simulated or look.simulated is True,
         )
     lines = standing.lines()
     if lines:
         # What is open counts however the controller stands.
         card = replace(card, mark="look" if card.mark == "ok" else card.mark)
-    return replace(card, lines=(*lines, *said, *card.lines))
+    if standing.unusual and card.mark == "ok":
+        card = replace(card, mark="look")
+    return replace(card, lines=(*lines, *said, *card.lines, *standing.past()))
 
 
 def _mark(look: CellLook) -> str:
@@ -255,7 +215,7 @@ def _read(look: CellLook, now_s: float) -> tuple[str, ...]:
     if read.get("held_by"):
         lines.append(tr("In use: {who}.", who=read["held_by"]))
     if isinstance(read.get("selected_tool"), int):
-        lines.append(tr("tool {number}", number=read["selected_tool"]))
+        lines.append(tr("tool {n} selected", n=read["selected_tool"]))
     if read.get("text"):
         lines.append(str(read["text"]))
     if now_s - look.taken_s >= STALE_AFTER_S:

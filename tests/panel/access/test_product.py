@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_cli.panel.app import Panel as Application
+from robolink_cli.panel.board import PanelCell
 from robolink_cli.panel.guard import access as access_module
 from robolink_cli.panel.guard.gate import LIVE, POSTS, REPORT_SECURITY
 from robolink_cli.panel.guard.people import Pins
-from robolink_cli.panel.hub import Hub, PanelCell
+from robolink_cli.panel.hub import Hub
 from robolink_cli.panel.jobs import KINDS, PanelJob, options_of
 from robolink_cli.panel.serving import PanelPlace, Served, serve
 from robolink_cli.panel.watch import CellWatch

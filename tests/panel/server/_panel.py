@@ -134,7 +134,7 @@ class LiveTablet:
         number = self.number if number is None else number
         await self.send(t="press", number=number, action=action, value=value, press=press)
 
-    async def press_until(self, holds, action, value="", within_s=15.0):
+    async def press_until(self, holds, action, value="", within_s=60.0):
         """Press until something holds: what is pressed as a screen appears does nothing."""
         until_s = time.monotonic() + within_s
         while time.monotonic() < until_s:
@@ -146,7 +146,7 @@ class LiveTablet:
                 continue
         raise AssertionError((self.screen, self.parts))
 
-    async def until(self, holds, within_s=15.0):
+    async def until(self, holds, within_s=60.0):
         """Wait until something holds of what is shown."""
         async with asyncio.timeout(within_s):
             while not (found := holds(self)):
@@ -154,7 +154,7 @@ class LiveTablet:
                 await self.news.wait()
         return found
 
-    async def answer(self, kind, press, within_s=15.0):
+    async def answer(self, kind, press, within_s=60.0):
         """Wait for what became of a press."""
         return await self.until(
             lambda page: next(

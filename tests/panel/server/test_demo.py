@@ -18,6 +18,9 @@ from robolink.errors import ConfigError
 from robolink.model import Secret
 from tests.panel.server._panel import Tablet
 
+# Each waits for processes to start, which a busy computer does slowly.
+pytestmark = pytest.mark.timeout(240)
+
 
 def children(pid):
     """Return the processes that a process has started."""

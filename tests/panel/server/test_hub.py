@@ -1,15 +1,18 @@
 """The hub: the last snapshot for every tablet, and no tablet that holds up another."""
 
 import asyncio
+import math
 import time
 from types import SimpleNamespace
 
 import pytest
 from robolink_cli.panel import hub as hub_module
-from robolink_cli.panel.hub import BEAT_S, Hub, LivePage, PanelCell, may_begin
+from robolink_cli.panel.board import PanelCell, may_begin
+from robolink_cli.panel.hub import BEAT_S, Hub, LivePage
 from robolink_cli.panel.jobs import KINDS, JobEnd, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
-from robolink_cli.panel.watch import CellLook, CellWatch, Standing, card_of
+from robolink_cli.panel.record import Standing
+from robolink_cli.panel.watch import CellLook, CellWatch, card_of
 from robolink_cli.wizard.views.records import Head, QuestionView, Status, View
 
 from robolink.model import Marker, MarkerKind
@@ -57,6 +60,12 @@ class FakeJob:
 
     async def wait(self):
         return None
+
+
+@pytest.fixture(autouse=True)
+def nothing_on_record(monkeypatch):
+    """Leave the record of the hub's cells alone: its tests are of what is shown."""
+    monkeypatch.setattr(hub_module, "RECORD_S", math.inf)
 
 
 def view(number, question="?", age_s=0.1):
@@ -226,7 +235,7 @@ def test_numbers_of_one_job_are_none_of_another(hub):
 
 
 def test_a_job_that_ended_without_order_is_told_and_on_record(hub, noted, monkeypatch):
-    monkeypatch.setattr(hub_module, "standing_of", lambda _: Standing())
+    monkeypatch.setattr(hub_module, "standing_of", lambda *_: Standing())
 
     async def work():
         board = hub.boards["line3"]

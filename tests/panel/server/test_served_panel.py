@@ -21,6 +21,9 @@ from tests.panel.server._panel import PIN, Tablet, panel
 
 RECIPES = Path(__file__).parents[3] / "examples" / "recipes"
 
+# Each waits for processes to start, which a busy computer does slowly.
+pytestmark = pytest.mark.timeout(240)
+
 
 @pytest.fixture(scope="module")
 def cells(tmp_path_factory):
@@ -93,6 +96,28 @@ def test_a_job_is_begun_pressed_and_left_and_old_numbers_press_nothing(served, c
             return max(after - before for before, after in pairwise(beats))
 
     assert run(work()) < 1.0, "the page would have turned grey"
+
+
+def test_a_press_that_was_long_on_its_way_does_nothing(served, cells):
+    """A cable was out meanwhile: the question is still the same, the person may have gone."""
+
+    async def work():
+        tablet = Tablet(served[1])
+        assert tablet.login() == 200
+        async with tablet.live("line3") as page:
+            await seated(page)
+            assert (await tablet.post("/start", cell="line3", job="change"))[0] == 200
+            await page.until(lambda page: page.screen == "choice")
+            await asyncio.sleep(0.4)
+            old = page.beats[-1][1]["at_ms"] - 2000
+            press = {"number": page.number, "action": "leave", "value": "", "press": "late"}
+            await page.send(t="press", at_ms=old, **press)
+            refused = await page.answer("refused", "late")
+            assert page.screen == "choice"
+            await to_idle(page)
+            return refused["why"]
+
+    assert "too late" in run(work())
 
 
 def test_stop_needs_no_login_no_token_and_reaches_a_job_that_is_at_work(served, cells):

@@ -25,7 +25,7 @@ from robolink_cli.options.shared import json_option
 if TYPE_CHECKING:
     from robolink.config import Cell
     from robolink_cli.commands.simulate.panel_cells import DemoCells
-    from robolink_cli.panel.hub import PanelCell
+    from robolink_cli.panel.board import PanelCell
     from robolink_cli.panel.serving import PanelPlace, Served
 
 NEEDED: Final = ("starlette", "uvicorn", "websockets")
@@ -97,7 +97,7 @@ def panel(
         if cells is not None:
             os.environ["ROBOLINK_CONFIG"] = str(cells.absolute())
         place, names = _place(host, port, certificate, key)
-        served = _served(cells, names)
+        served = _served(cells, names, simulated=demo)
         from robolink_cli.panel.guard.audit import Audit
         from robolink_cli.panel.serving import run
 
@@ -164,7 +164,7 @@ def _place(
     return PanelPlace(host, port, str(found.path), str(found.key), name), found.names
 
 
-def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
+def _served(cells_file: Path | None, names: tuple[str, ...], *, simulated: bool) -> "Served":
     """Return what the panel shows, and to whom.
 
     Raises:
@@ -191,15 +191,15 @@ def _served(cells_file: Path | None, names: tuple[str, ...]) -> "Served":
             remedy=tr("To set one up: robolink cell new. To practise: robolink panel --demo"),
         )
     return Served(
-        tuple(_shown(cell) for cell in found.values()),
+        tuple(_shown(cell, simulated=simulated) for cell in found.values()),
         {name: cell.settings.people for name, cell in found.items()},
         names,
         language=language_now(),
     )
 
 
-def _shown(cell: "Cell") -> "PanelCell":
-    from robolink_cli.panel.hub import PanelCell
+def _shown(cell: "Cell", *, simulated: bool) -> "PanelCell":
+    from robolink_cli.panel.board import PanelCell
 
     settings = cell.settings
     return PanelCell(
@@ -208,6 +208,8 @@ def _shown(cell: "Cell") -> "PanelCell":
         settings.watch_s,
         stations=tuple(settings.stations or ()),
         tool=settings.tool,
+        simulated=simulated,
+        configured=cell,
     )
 
 

@@ -51,7 +51,7 @@ def _told(
     """Return what is known of one tool, as JSON."""
     from robolink.model import EntryKind, json_value
     from robolink.transaction import changed_since
-    from robolink_cli.commands.measure.recipe_choice import due_in
+    from robolink_cli.session.cell_recipes import due_in
 
     last = next(controller.outcomes.recorded(tool=number, kinds=(EntryKind.DONE,)), None)
     since = changed_since(controller, number, offset)
@@ -77,7 +77,7 @@ def _changes_left(context: CliContext) -> dict[int, int]:
     """Return how many changes each tool may have before a full calibration, by the recipes."""
     from robolink.journal import default_location, may_exist, open_journal
     from robolink.recipe import changes_left_of, load_recipe
-    from robolink_cli.commands.measure.recipe_choice import recipes_at
+    from robolink_cli.session.cell_recipes import recipes_at
     from robolink_cli.session.completion import address_of
 
     address, name = address_of(context.url), context.cell.name if context.cell else ""

@@ -56,6 +56,7 @@ function hear(frame) {
     shown = true;
   } else if (frame.t === "beat") {
     atMs = typeof frame.at_ms === "number" ? {server: frame.at_ms, now: now(), date: Date.now()} : null;
+    fresh = shown;
     readAt = typeof frame.age_ms === "number" ? now() - frame.age_ms : null;
     if (document.visibilityState === "visible") send({t: "pong"});
   } else if (frame.t === "stopped") stopAnswered(frame);
@@ -218,12 +219,17 @@ function act(done) {
   else if (what.post) post(done);
   else if (what.action) {
     const value = what.field ? typed(what.field) : what.value;
-    if (!send({t: "press", number: done.number, action: what.action, value, press: identity(), ...byServer(now())})) unheard();
+    if (!send({t: "press", number: done.number, action: what.action, value, press: identity(), ...byServer()})) unheard();
   }
 }
 
-// A moment by the clock of the server: what was sent before a cable came out is late when it arrives.
-const byServer = (moment) => (atMs === null ? {} : {at_ms: Math.round(atMs + moment)});
+// Now, by the clock of the server: what was sent before a cable came out is late when it arrives.
+// In a tablet that slept one clock stood still, and one may be set anew: the longer time counts, so
+// that no press of now is taken for an old one.
+function byServer() {
+  if (atMs === null) return {};
+  return {at_ms: Math.round(atMs.server + Math.max(now() - atMs.now, Date.now() - atMs.date))};
+}
 
 const typed = (name) => document.querySelector(`[data-typed="${name}"]`)?.value ?? "";
 
@@ -270,14 +276,14 @@ const unheard = () => note(place("note").querySelector("[data-why]").dataset.unh
 function hold() {
   if (!press || silent) return;
   const finger = identity();
-  if (!send({t: "hold", number: press.number, axis: press.what.hold, finger, ...byServer(now())})) { unheard(); drop(); return; }
+  if (!send({t: "hold", number: press.number, axis: press.what.hold, finger, ...byServer()})) { unheard(); drop(); return; }
   held = {finger, last: now(), timer: setInterval(beat, BEAT_MS)};
 }
 
 function beat() {
   const late = now() - held.last > LEASE_MS; // the page was stuck: who knows where the finger is
   held.last = now();
-  if (late || !send({t: "beat", finger: held.finger, ...byServer(now())})) drop();
+  if (late || !send({t: "beat", finger: held.finger, ...byServer()})) drop();
 }
 
 function release() {
@@ -290,10 +296,7 @@ function release() {
 let latest = null;
 function stop() {
   const one = {press: identity(), begun: now(), done: false};
-  // The press, by the clock of the server. In a tablet that slept one clock stood still, and one may be set anew:
-  // the longer time counts, so that no press of now is taken for an old one.
-  const since = atMs === null ? 0 : Math.max(one.begun - atMs.now, Date.now() - atMs.date);
-  const at = atMs === null ? {} : {at_ms: Math.round(atMs.server + since)};
+  const at = byServer();
   latest = one;
   place("stopped").hidden = true;
   place("stop").classList.add("down");

@@ -375,10 +375,7 @@ class Runner:
         return typed_pose(text, here, self._settings)
 
     def _seen_through(self, go: Callable[[], T], target: Pose, *, by_hand: bool = False) -> T:
-        """Move when all permits are given; again from here if this computer was too busy to.
-
-        The controller has ended the movement: a person decides on another, a few times at most.
-        """
+        """Move when all permits are given; if this computer was too busy to, a person decides."""
         while True:
             try:
                 with movement_permit(self._controller, by_hand=by_hand):

@@ -124,6 +124,7 @@ def test_there_is_one_door_to_the_console():
         "render.py": {"print"},  # of rich, with cells that went through output.py
         "completion.py": {"echo"},  # a script for the shell, of our own words
         "unfit_packages.py": {"write"},  # used where click cannot be imported; JSON, or visible()
+        "stop.py": {"write"},  # JSON for the panel, whose process it is; nobody reads it
     }
     folder = Path(robolink_cli.__file__).parent
     examples = folder / "examples"  # in the wheel: programs to be copied, which print as they like

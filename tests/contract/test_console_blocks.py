@@ -107,6 +107,16 @@ NOT_RUN = {
         "tests/cli/test_sim_run.py",
         ('"sim", "run"', "test_all_kinds_are_served_by_one_process"),
     ),
+    "panel.md 1": Elsewhere(
+        "a PIN is typed unseen",
+        "tests/panel/access/test_access_commands.py",
+        ('"panel", "pin"', '"panel", "pin", "mei"'),
+    ),
+    "panel.md 2": Elsewhere(
+        "it serves until Ctrl-C, under an address of this computer",
+        "tests/panel/access/test_access_commands.py",
+        ('"panel", "cert"',),
+    ),
     "reference/jogging.md 2": Elsewhere(
         "keys are held down on a terminal",
         "tests/contract/test_jog_keys.py",

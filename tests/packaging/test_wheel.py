@@ -203,7 +203,7 @@ def test_no_second_name_leads_to_the_same_code(folder):
 def test_ci_runs_what_a_person_runs():
     script = ROOT / ".ci" / "run"
     assert os.access(script, os.X_OK)
-    assert script.read_text().rstrip().endswith("exec make test")
+    assert script.read_text().rstrip().endswith("make panel\nexec make test")
 
 
 # An integrator's project, outside this one, with the wheel and nothing else.

@@ -23,9 +23,9 @@ from robolink_cli.wizard.happenings import (
     Effect,
     Happening,
     HasEnded,
-    HeldBack,
     KeyPressed,
     LineTyped,
+    MovementHeld,
     OffersAtTheEnd,
     Pressed,
     Reading,
@@ -121,7 +121,7 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
     if isinstance(subject, CellIs):
         return _known(state, subject.simulated, subject.needle)
-    if isinstance(subject, HeldBack):
+    if isinstance(subject, MovementHeld):
         return replace(state, held_back=subject.why)
     if isinstance(subject, OffersAtTheEnd):
         return replace(state, offers=subject.offers)

@@ -62,7 +62,7 @@ class TaughtPoints:
 
 
 @dataclass(frozen=True, slots=True)
-class HeldBack:
+class MovementHeld:
     """Something keeps a movement from beginning, or does so no longer.
 
     Attributes:

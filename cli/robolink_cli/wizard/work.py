@@ -17,7 +17,7 @@ from robolink.runner import MoveSubject, Question
 from robolink_cli.console.person import Person, person_here
 from robolink_cli.wizard.happenings import (
     Happening,
-    HeldBack,
+    MovementHeld,
     Reading,
     SendAnswer,
     WaitsForAnswer,
@@ -115,13 +115,13 @@ class Desk:
             heed()
             self._require_somebody()
             if reason != told:
-                self.regard(HeldBack(reason))
+                self.regard(MovementHeld(reason))
                 self.tell(reason)
                 told = reason
             self._look()
             time.sleep(GLANCE_S)
         if told:
-            self.regard(HeldBack(""))
+            self.regard(MovementHeld(""))
             self.tell(tr("The robot goes on."))
 
     def _require_somebody(self) -> None:

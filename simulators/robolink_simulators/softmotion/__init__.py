@@ -1,7 +1,7 @@
 """A simulated CODESYS SoftMotion axis group: SIMULATED, no runtime system is involved.
 
-What is simulated and on what evidence stands in docs/reference/simulated-softmotion.md; the facts are
-those of docs/reference/softmotion.md.
+What is simulated and on what evidence stands in docs/reference/simulated-softmotion.md; the facts
+are those of docs/reference/softmotion.md.
 """
 
 from robolink_simulators.softmotion.catalogue import MachineModel, machine_named

@@ -14,7 +14,7 @@ import pytest
 from robolink_cli import main
 from robolink_cli.wizard.faces.link import WireLink
 from robolink_cli.wizard.faces.wire import WireFace
-from robolink_cli.wizard.happenings import HeldBack, WasRegarded
+from robolink_cli.wizard.happenings import MovementHeld, WasRegarded
 from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.state import LastScreen
 from robolink_cli.wizard.views.records import (
@@ -433,10 +433,10 @@ def test_what_keeps_a_movement_back_stands_on_its_screen():
     going = MoveSubject(Pose(300.0, 400.0, -60.0, 90.0, tool=0), Path.JOINT, 20.0, "Up.")
     hand = Sitting().happens(WasRegarded(going))
     assert screen_of(hand.state, hand.now).message == "The robot is moving."
-    hand.happens(WasRegarded(HeldBack("Input 5 is off.")))
+    hand.happens(WasRegarded(MovementHeld("Input 5 is off.")))
     assert screen_of(hand.state, hand.now).message == "Input 5 is off."
     body = view_of(hand.state, hand.now).body
     assert isinstance(body, MovingView)
     assert body.held == "Input 5 is off."
-    hand.happens(WasRegarded(HeldBack("")))
+    hand.happens(WasRegarded(MovementHeld("")))
     assert screen_of(hand.state, hand.now).message == "The robot is moving."

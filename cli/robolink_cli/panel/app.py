@@ -238,6 +238,7 @@ class Panel:
                 text = await socket.receive_text()
                 frame = parsed(text) if len(text) <= MOST_BYTES else None
                 live.heard_s = time.monotonic()
+                self._seats.heard(live.tablet)
                 if frame is not None:
                     self._hear(socket, live, frame)
 

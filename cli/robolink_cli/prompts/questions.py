@@ -14,7 +14,7 @@ import click
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.person import person_here
+from robolink_cli.console.person import Person, person_here
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.declaration import CliOption
 
@@ -116,7 +116,12 @@ def require_yes(question: str) -> None:
         DeclinedError: The answer was no.
     """
     if not asked(question):
-        raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was sent."))
+        raise DeclinedError(not_yes(), remedy=tr("Nothing was sent."))
+
+
+def not_yes() -> str:
+    """Return that the answer was no: on a page it was pressed, on a terminal anything but y."""
+    return tr("You answered no.") if person_here() is Person.WIRE else tr("That was not y.")
 
 
 _POSITIVE: Final = NumberInside(min=0, min_open=True)
@@ -187,4 +192,4 @@ def _ask(figure: str, findings: str) -> None:
             ),
         )
     if not asked(tr("{figure} Write it anyway? Check sign and unit first.", figure=figure)):
-        raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was written."))
+        raise DeclinedError(not_yes(), remedy=tr("Nothing was written."))

@@ -28,7 +28,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
             nobody had stopped, or there is no terminal.
         DeclinedError: The answer was no.
     """
-    from robolink_cli.prompts.questions import asked
+    from robolink_cli.prompts.questions import asked, not_yes
 
     keys, name = far_end_of(url), own_name_of(controller)
     found = find_note(keys, name)
@@ -42,7 +42,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
         )
     note(found.sentence)
     if not asked(tr("Has the cause been checked, and may the robot move again?")):
-        raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was sent."))
+        raise DeclinedError(not_yes(), remedy=tr("Nothing was sent."))
     _clear(keys, name)
 
 

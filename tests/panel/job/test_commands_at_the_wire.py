@@ -87,7 +87,7 @@ def test_a_no_sends_nothing_and_its_end_says_so(robot):
     after = simulator.machine.tools.get(1)
     code, end, _ = through(["-c", url, "undo"], answers={1: "no"})
     assert (code, end.done, end.blocked) == (9, False, False)
-    assert "That was not y." in lines_of(end)
+    assert "You answered no." in lines_of(end)
     assert simulator.machine.tools.get(1) == after
 
 

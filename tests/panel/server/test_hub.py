@@ -7,15 +7,20 @@ from types import SimpleNamespace
 
 import pytest
 from robolink_cli.panel import hub as hub_module
+from robolink_cli.panel.app import Panel
 from robolink_cli.panel.board import PanelCell, may_begin
+from robolink_cli.panel.guard.pairing import Tablet as SeatedTablet
+from robolink_cli.panel.guard.seat import SILENCE_S, Seats
 from robolink_cli.panel.hub import BEAT_S, Hub, LivePage
 from robolink_cli.panel.jobs import KINDS, JobEnd, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
 from robolink_cli.panel.record import Standing
 from robolink_cli.panel.watch import CellLook, CellWatch, card_of
 from robolink_cli.wizard.views.records import Head, QuestionView, Status, View
+from starlette.websockets import WebSocketDisconnect
 
 from robolink.model import Marker, MarkerKind
+from tests.panel.access._bare import Clock
 
 CELL = PanelCell("line3", "epson+tcp://192.0.2.1:5000")
 
@@ -252,6 +257,29 @@ def test_a_job_that_ended_without_order_is_told_and_on_record(hub, noted, monkey
     assert "ended without saying how" in board.said[0]
     assert "Traceback" not in "".join(board.said)
     assert ("job_lost", "line3") in noted
+
+
+def test_a_tablet_that_is_heard_keeps_its_seat_however_long_a_job_takes(hub):
+    clock = Clock()
+    seats = Seats(clock)
+    seats.take("line3", SeatedTablet("t1", "10.0.0.1", paired=True), moving=False)
+
+    class Line:
+        frames = 4
+
+        async def receive_text(self):
+            self.frames -= 1
+            if self.frames < 0:
+                raise WebSocketDisconnect
+            clock.sleep(SILENCE_S * 0.9)
+            return '{"t":"pong"}'
+
+    access = SimpleNamespace(seats=seats, audit=SimpleNamespace(note=None))
+    panel = Panel(hub, None, access, None)
+    asyncio.run(panel._listen(Line(), Tablet().live))
+    assert seats.holder("line3", moving=False) is not None
+    clock.sleep(SILENCE_S * 1.1)
+    assert seats.holder("line3", moving=False) is None
 
 
 # The card of a cell on which no job runs.

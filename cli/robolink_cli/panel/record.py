@@ -47,14 +47,14 @@ class LastChange:
 
     def lines(self) -> tuple[str, ...]:
         """Return it in words, in the language that is spoken."""
-        changed = tr("last change: {when}, {who}", when=local_label(self.at), who=self.who)
+        when = local_label(self.at)
         if self.tool is None:
-            return (changed,)
+            return (tr("last change: {when}, {who}", when=when, who=self.who),)
         if self.needle:
             what = tr("tool {tools}, needle {id}", tools=self.tool, id=self.needle)
         else:
             what = tr("tool {tools}", tools=self.tool)
-        return (changed, tr("changed then: {what}", what=what))
+        return (tr("last change: {what}, {when}, {who}", what=what, when=when, who=self.who),)
 
 
 @dataclass(frozen=True, slots=True)

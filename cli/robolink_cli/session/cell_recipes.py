@@ -46,7 +46,8 @@ def record_of(loaded: "LoadedRecipe", past: "RecipePast") -> tuple[str, ...]:
         loaded: The recipe.
         past: Its records.
     """
-    return (*duration_of(past), *told_of(loaded, past)[1:])
+    _, tools, *rest = told_of(loaded, past)
+    return (" \N{MIDDLE DOT} ".join((*duration_of(past), tools)), *rest)
 
 
 def recipes_at(cell: "Cell | None") -> list[Path]:

@@ -163,8 +163,7 @@ def _no_machine(name: str) -> ConfigError:
             (
                 known_names(NAMES, name),
                 tr(
-                    "Or give module:Class for your own. "
-                    "See docs/reference/simulated-softmotion.md."
+                    "Or give module:Class for your own. See docs/reference/simulated-softmotion.md."
                 ),
             ),
         ),

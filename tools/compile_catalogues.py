@@ -35,7 +35,14 @@ class CatalogueHook(BuildHookInterface):  # type: ignore[type-arg]
     def _pages(self) -> dict[str, str]:
         """Return where each page and picture goes; installed in place they are where they are."""
         docs = Path(self.root, "docs")
-        patterns = ("*.md", "*.json", "reference/*.md", "decisions/*.md", "pictures/*.svg")
+        patterns = (
+            "*.md",
+            "*.json",
+            "reference/*.md",
+            "decisions/*.md",
+            "pictures/*.svg",
+            "pictures/*.png",
+        )
         found = (path for pattern in patterns for path in docs.glob(pattern))
         return {
             str(path): f"robolink_cli/docs/{path.relative_to(docs).as_posix()}" for path in found

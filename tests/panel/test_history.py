@@ -1,7 +1,9 @@
 """The history page: rows and charts come from the journal of changes that were really made."""
 
 import pytest
+from robolink_cli.panel import record
 from robolink_cli.panel.history import changes_of, charts_of, page_of
+from robolink_cli.panel.record import Standing, standing_of
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.tip_switches import LightBeam
 from robolink_simulators.epson import EpsonSimulator
@@ -48,6 +50,46 @@ def test_two_changes_are_rows_charts_and_pages_of_this_cell(changed):
     assert {card.title for card in cards} >= {"X of tool 1", "Y of tool 1"}
     assert all(card.picture.startswith("<svg") and not card.unusual for card in cards)
     assert charts_of(changed, striking=True) == ()
+
+
+def test_a_card_tells_the_last_change_and_works_the_drift_out_once(changed, monkeypatch):
+    found = standing_of(changed)
+    assert (found.last.tool, found.last.needle, found.simulated) == (1, "N-2", True)
+    assert found.unusual is None, "two changes do not tell whether one is unusual"
+    assert "tool 1, needle N-2" in " ".join(found.past())
+
+    def again(*_):
+        raise AssertionError("the drift was worked out again though nothing is new")
+
+    monkeypatch.setattr(record, "cell_drift", again)
+    assert standing_of(changed, found) == found
+    seen = open_journal().log(changed, signature=Signature(operator="Chen", os_user="cell"))
+    seen.append(NewEntry(EntryKind.PANEL, details={"kind": "login"}))
+    assert standing_of(changed, found) == found, "a login is no change"
+
+
+def test_a_card_tells_no_change_that_was_taken_back(robolink_state, monkeypatch):
+    def ended(change, needle, *kinds):
+        signature = Signature(operator="Chen", os_user="cell", nozzle=needle)
+        log = open_journal().log(URL, signature=signature)
+        for kind in kinds:
+            log.append(NewEntry(kind, change=change * 32, operation=change, tool=2))
+
+    ended("a", "N-1", EntryKind.DONE)
+    ended("b", "N-2", EntryKind.DONE, EntryKind.ROLLED_BACK)
+    found = standing_of(URL)
+    assert (found.last.who, found.last.needle) == ("Chen", "N-1")
+    assert not found.simulated
+
+    ended("c", "N-3", EntryKind.DONE)
+    assert standing_of(URL, found).last.needle == "N-3", "what was found before outlived a change"
+
+
+def test_a_stop_that_was_released_is_not_told_from_what_was_found_before(changed):
+    before = standing_of(changed)
+    held = Standing(("open",), "stopped", before.last, before.unusual, before.newest)
+    found = standing_of(changed, held)
+    assert (found.interrupted, found.stopped) == ((), None)
 
 
 def test_without_a_journal_there_is_nothing(robolink_state):

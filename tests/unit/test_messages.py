@@ -62,7 +62,7 @@ def when_imported(top):
     while waiting:
         node = waiting.pop()
         yield node
-        if isinstance(node, ast.FunctionDef):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             defaults = [one for one in node.args.kw_defaults if one is not None]
             waiting += [*node.decorator_list, *node.args.defaults, *defaults]
         elif not isinstance(node, ast.Lambda):

@@ -166,7 +166,7 @@ class Panel:
                 cell=board.name,
                 changes=changes,
                 charts=charts,
-                simulated=board.simulated or board.standing.simulated,
+                simulated=board.simulated,
                 token=self._token(request),
             )
         )

@@ -71,7 +71,7 @@ class Board:
         self.standing = Standing()
         self.recipes: tuple[RecipeOffer, ...] = ()
         self.record_s = 0.0
-        self._simulated = False
+        self._simulated: bool | None = None
         self.job: PanelJob | None = None
         self.said: tuple[str, ...] = ()
         self.base = (1 + secrets.randbelow(1000)) * _NUMBERS
@@ -97,16 +97,18 @@ class Board:
 
     @property
     def simulated(self) -> bool:
-        """Whether nothing real moves, as far as who read the controller last says."""
+        """Whether nothing real moves: what who read the controller last says, else the record."""
         view, look = self.view, self.watch.look
         if view is not None:
             if view.status is not None or view.head.simulated:
                 self._simulated = view.head.simulated
         elif look is not None and look.failed:
-            self._simulated = False
+            self._simulated = None
+            return self.cell.simulated  # what does not answer may be another by now
         elif look is not None and look.simulated is not None:
             self._simulated = look.simulated
-        return self.cell.simulated or self._simulated
+        known = self.standing.simulated if self._simulated is None else self._simulated
+        return self.cell.simulated or known
 
     @property
     def number(self) -> int:

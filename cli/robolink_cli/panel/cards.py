@@ -39,6 +39,7 @@ class CellCard:
         seat: Who works on it; empty for nobody.
         jobs: What can be begun.
         read: Whether the controller was read, so that there is an age to be shown.
+        said: What the last job left to be read, in full.
     """
 
     name: str
@@ -50,6 +51,7 @@ class CellCard:
     seat: str = ""
     jobs: tuple[JobOffer, ...] = ()
     read: bool = False
+    said: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

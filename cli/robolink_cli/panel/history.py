@@ -19,8 +19,7 @@ from robolink.transaction import id_of_change
 from robolink.transport import parse_url
 from robolink_cli.access.change_page import reports_from
 from robolink_cli.panel.cards import ChangeRow, ChartCard
-from robolink_cli.panel.record import cell_drift, journal_there
-from robolink_cli.views.journal import who
+from robolink_cli.panel.record import cell_drift, journal_there, person_of
 
 MOST_ROWS: Final = 25
 """Largest number of changes on the page, the newest first: ``robolink journal list`` has all."""
@@ -108,7 +107,7 @@ def _rows(journal: Journal, address: str) -> Iterator[ChangeRow]:
 def _row(change: str, entries: Sequence[Recorded]) -> ChangeRow:
     """Return a change in one row; one that cannot be understood is told as such."""
     first = entries[0]
-    when, person = local_label(first.at), who(first)
+    when, person = local_label(first.at), person_of(first)
     try:
         # The chain of the whole journal is checked when the page of a change is opened.
         reports = reports_of(

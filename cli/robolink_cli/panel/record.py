@@ -18,7 +18,6 @@ from robolink.stopping import find_note
 from robolink.timing import local_label
 from robolink.transport import far_end_of, parse_url
 from robolink_cli.stopping.notes import last_known
-from robolink_cli.views.journal import who
 
 if TYPE_CHECKING:
     from robolink.model import Marker
@@ -69,7 +68,7 @@ class Standing:
         unusual: Whether something is unusual in its drift; ``None`` where too little is on record
             to tell.
         newest: Number of the newest entry from which ``unusual`` comes.
-        simulated: Whether that entry is of a simulator, as far as its name says.
+        simulated: Whether a simulator was met there last, as far as its name says.
     """
 
     interrupted: "tuple[Marker, ...]" = ()
@@ -118,7 +117,12 @@ def standing_of(url: str, before: Standing | None = None) -> Standing:
         if journal is not None:
             address = parse_url(url).address
             found = _past_of(journal, address, before or found)
-            found = replace(found, interrupted=journal.log(address).open_markers())
+            met = journal.names_of(address)[:1]
+            found = replace(
+                found,
+                interrupted=journal.log(address).open_markers(),
+                simulated=any(map(is_simulated_name, met)),
+            )
     with suppress(RobolinkError, OSError):
         found = replace(found, stopped=find_note(far_end_of(url), last_known(url)))
     return found
@@ -156,13 +160,12 @@ def _past_of(journal: Journal, address: str, before: Standing) -> Standing:
     if newest is None:
         return Standing()
     if newest.number == before.newest:
-        return replace(before, interrupted=(), stopped=None)
+        return replace(before, interrupted=(), stopped=None, simulated=False)
     with suppress(KeyError, TypeError, ValueError):  # a damaged entry: no drift can be told
         return Standing(
             last=_last_change(journal, address),
             unusual=_unusual(cell_drift(journal, address)),
             newest=newest.number,
-            simulated=is_simulated_name(newest.controller),
         )
     return Standing(newest=newest.number)
 
@@ -178,7 +181,12 @@ def _last_change(journal: Journal, address: str) -> LastChange | None:
 
 
 def _as_change(entry: Recorded) -> LastChange:
-    return LastChange(entry.at, who(entry), entry.tool, entry.signature.nozzle)
+    return LastChange(entry.at, person_of(entry), entry.tool, entry.signature.nozzle)
+
+
+def person_of(entry: Recorded) -> str:
+    """Return who made an entry: a role is shown where people are, and in their language."""
+    return entry.signature.operator or entry.signature.os_user
 
 
 def _unusual(drift: CellDrift) -> bool | None:

@@ -63,12 +63,14 @@ class CellLook:
 
     @property
     def simulated(self) -> bool | None:
-        """Whether the controller says that nothing real moves; ``None`` where it was not read."""
-        if not self.read:
-            return None
-        if is_simulated_name(str(self.read.get("controller", ""))):
+        """Whether the controller said that nothing real moves; ``None`` where it did not say.
+
+        A look at an EPSON controller reads no serial number: who it is, only a job asks.
+        """
+        name, said = str(self.read.get("controller", "")), self.read.get("simulated")
+        if is_simulated_name(name) or said is True:
             return True
-        return None if self.read.get("held_by") else self.read.get("simulated") is True
+        return False if said is False or (name and "://" not in name) else None
 
     @property
     def taken_s(self) -> float:
@@ -198,7 +200,10 @@ def card_of(
         card = replace(card, mark="look" if card.mark == "ok" else card.mark)
     if standing.unusual and card.mark == "ok":
         card = replace(card, mark="look")
-    return replace(card, lines=(*lines, *said, *card.lines, *standing.past()))
+    # Of what the last job left the first line tells how it ended; the rest stands below.
+    head, _, _ = "\n".join(said).partition("\n")
+    told = (*lines, *((head,) if head else ()), *card.lines, *standing.past())
+    return replace(card, lines=told, said=said)
 
 
 def _mark(look: CellLook) -> str:

@@ -416,7 +416,7 @@ class SoftMotionTimes:
     @property
     def answers(self) -> AnswerCounts:
         """For how many answers each is waited for: snapshots, blocks, and looks at the end."""
-        return AnswerCounts(run=30.0, tool=30.0, select=4.0, move=6.5, search=9.0)
+        return AnswerCounts(run=40.0, tool=50.0, select=4.0, move=2.8, search=3.5)
 
     def move_s(self, way: Way) -> float | None:
         """Return the seconds of a movement; see :class:`robolink.controllers.MovementTimes`."""

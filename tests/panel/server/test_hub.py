@@ -359,6 +359,77 @@ def test_each_station_of_the_cell_file_is_offered_and_no_other_is_taken():
     assert job.arguments == ["-c", "line3", "--operator", "mei", *learn]
 
 
+def recipe(name):
+    return SimpleNamespace(name=name, path=f"/cells/{name}.toml", told=lambda: (f"{name} told",))
+
+
+def test_each_recipe_is_offered_and_only_an_offered_one_is_taken(hub):
+    board, kind = hub.boards["line3"], KINDS["change"]
+
+    def offers():
+        return [one for one in board.offers(Watcher(role="operator")) if one.job == "change"]
+
+    assert [(one.details, dict(one.values)) for one in offers()] == [((), {})]
+    board.recipes = (recipe("needle"),)
+    (only,) = offers()
+    assert dict(only.values) == {}, "the job tells more of a single recipe"
+    assert only.details == ("recipe: needle", "needle told")
+    board.recipes = (recipe("needle"), recipe("two"))
+    assert [dict(one.values) for one in offers()] == [{"recipe": "needle"}, {"recipe": "two"}]
+    assert board.recipe(kind, {"recipe": "two"}) == "/cells/two.toml"
+    for wrong in (None, "two", {}, {"recipe": "/etc/passwd"}, {"recipe": ["two"]}):
+        assert board.recipe(kind, wrong) == ""
+    assert board.recipe(KINDS["undo"], {"recipe": "two"}) == ""
+    board.recipes = (recipe("needle"), recipe("needle"))
+    assert [dict(one.values) for one in offers()] == [{}], "a name that two share chooses neither"
+    assert board.recipe(kind, {"recipe": "needle"}) == ""
+
+
+def test_a_job_with_a_recipe_names_its_file_and_nothing_that_is_an_option():
+    one = PanelJob(
+        "line3", KINDS["change"], language="en", who="", changed=lambda: None, recipe="-x.toml"
+    )
+    assert one.arguments == ["-c", "line3", "change", "--", "-x.toml"]
+
+
+def test_simulated_is_only_what_the_last_reader_was_told(hub):
+    board = hub.boards["line3"]
+    simulated = {**READY, "controller": "epson:C-SIM0A1B2C3D/SIM0A1B2C3D"}
+    held = {**READY, "controller": CELL.url, "held_by": "ann"}
+    nameless = {**READY, "controller": CELL.url}
+    plc = {**READY, "controller": "softmotion:1A"}
+    for read, shown in (
+        (None, False),
+        (simulated, True),
+        (None, True),  # a job has ended, and the next look is under way
+        (held, True),
+        (nameless, True),
+        ({**nameless, "controller": "epson:C-T60A1B2C3D/T6"}, False),
+        ({**plc, "simulated": True}, True),
+        ({**plc, "simulated": False}, False),
+    ):
+        board.watch.look = None if read is None else CellLook(50.0, AT, read)
+        assert board.simulated is shown, read
+    board.watch.look = CellLook(50.0, AT, failed="no route")
+    assert not board.simulated, "what does not answer may be another"
+    board.watch.look = CellLook(50.0, AT, nameless)
+    board.standing = Standing(simulated=True)
+    assert board.simulated, "a simulator was met there last"
+    board.job = FakeJob()
+    board.job.view = view(1)
+    assert not board.simulated, "the job is connected to a real one"
+    board.job = None
+    assert not board.simulated, "the record outweighs a job that was connected since"
+
+
+def test_no_age_is_told_where_nothing_was_read(hub):
+    board = hub.boards["line3"]
+    assert hub.beat(Tablet().live, 60.0)["age_ms"] is None
+    board.watch.look = CellLook(50.0, AT, READY)
+    assert hub.beat(Tablet().live, 60.0)["age_ms"] == 10_000
+    assert hub.beat(Tablet(cell="").live, 60.0)["age_ms"] is None
+
+
 def test_a_cell_that_names_no_tool_finds_no_station():
     cell = PanelCell("line3", CELL.url, stations=("PIN-07",))
     board = Hub([cell], FewPages(), NoSeats(), lambda *_, **__: None).boards["line3"]

@@ -121,30 +121,6 @@ def test_a_killed_process_is_known_to_have_ended_without_order(behaves):
     assert not asyncio.run(work()).end.in_order
 
 
-def test_where_the_panel_is_killed_the_line_of_the_job_ends(behaves, tmp_path):
-    behaves("well")
-    panel = (
-        "import asyncio, os\n"
-        "from tests.panel.server.test_jobs import job, shown\n"
-        "async def work():\n"
-        "    one = job()\n"
-        "    await one.start()\n"
-        "    await shown(one)\n"
-        "    os.kill(os.getpid(), 9)\n"
-        "asyncio.run(work())\n"
-    )
-
-    async def work():
-        process = await asyncio.create_subprocess_exec(sys.executable, "-c", panel)
-        await process.wait()
-        until_s = time.monotonic() + 20
-        while not (tmp_path / "end").exists() and time.monotonic() < until_s:
-            await asyncio.sleep(0.02)
-
-    asyncio.run(work())
-    assert (tmp_path / "end").read_text() == "the line ended"
-
-
 def test_what_a_job_does_not_take_is_not_kept_without_bound(behaves):
     behaves("deaf")
 

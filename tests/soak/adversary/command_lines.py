@@ -67,7 +67,11 @@ FOLDER: Final = "{folder}"
 
 LEFT_OUT: Final[Mapping[str, str]] = {
     "sim": "it serves simulators until it is ended",
-    "demo": "it brings a controller of its own",
+    "expert demo": "it brings a controller of its own",
+    "panel": "it serves pages until it is ended; its jobs are these command lines",
+    "panel pin": "it is about the people of this computer alone",
+    "panel tablets": "it is about the tablets of this computer alone",
+    "panel cert": "it writes a file of this computer alone",
     "cell list": "it reads files of this computer alone",
     "cell show": "it reads files of this computer alone",
     "cell check": "it looks at the cells of this computer's files",

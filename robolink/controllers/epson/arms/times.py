@@ -51,7 +51,7 @@ class EpsonTimes:
     @property
     def answers(self) -> AnswerCounts:
         """For how many answers each is waited for: one look before, the start, one look after."""
-        return AnswerCounts(run=25.0, tool=20.0, select=4.0, move=3.5, search=5.0)
+        return AnswerCounts(run=30.0, tool=20.0, select=4.0, move=3.5, search=5.0)
 
     def move_s(self, way: Way) -> float | None:
         """Return the seconds of a movement; see :class:`robolink.controllers.MovementTimes`."""

@@ -1,6 +1,7 @@
 """What counts as the robot's time, and what is foreseen from it."""
 
 from contextlib import nullcontext
+from itertools import count
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +18,9 @@ from robolink.timing import AnswerTimes
 
 PARKED, START, PLACE = (Pose(x, 0, 50, 0, tool=0) for x in (0, 300, 400))
 
+_NUMBERS = count()
+"""Each controller has a record of its own; an address may be that of an earlier one."""
+
 
 class Controller:
     """A controller that answers after a while, and moves at 100 mm/s."""
@@ -25,7 +29,7 @@ class Controller:
         self.clock = ManualClock()
         self.answers = AnswerTimes(self.clock)
         self.answer_s = answer_s
-        self.outcomes = memory_journal(f"robot-time-{id(self)}").log("a")
+        self.outcomes = memory_journal(f"robot-time-{next(_NUMBERS)}").log("a")
         self.outcomes.signature = Signature(recipe="needle", version="1")
 
     def ask(self, times=1):

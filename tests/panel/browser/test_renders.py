@@ -11,7 +11,8 @@ from tests.panel.browser import samples
 from tests.panel.browser.conftest import SIZES
 from tests.panel.browser.scripted import OPERATOR
 
-SCREENS = tuple(samples.views("en"))
+pytestmark = pytest.mark.timeout(240)
+
 PAGES = ("idle", "busy", "overview", "history", "login", "pairing")
 
 LEAST = {"1280": 86, "1024": 67}

@@ -1,9 +1,12 @@
 """The history page: rows and charts come from the journal of changes that were really made."""
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 from robolink_cli.panel import record
 from robolink_cli.panel.history import changes_of, charts_of, page_of
-from robolink_cli.panel.record import Standing, standing_of
+from robolink_cli.panel.record import LastChange, standing_of
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.tip_switches import LightBeam
 from robolink_simulators.epson import EpsonSimulator
@@ -52,9 +55,14 @@ def test_two_changes_are_rows_charts_and_pages_of_this_cell(changed):
     assert charts_of(changed, striking=True) == ()
 
 
+def last_of(found) -> LastChange:
+    assert found.last is not None
+    return found.last
+
+
 def test_a_card_tells_the_last_change_and_works_the_drift_out_once(changed, monkeypatch):
     found = standing_of(changed)
-    assert (found.last.tool, found.last.needle, found.simulated) == (1, "N-2", True)
+    assert (last_of(found).tool, last_of(found).needle, found.simulated) == (1, "N-2", True)
     assert found.unusual is None, "two changes do not tell whether one is unusual"
     assert "tool 1, needle N-2" in " ".join(found.past())
 
@@ -78,17 +86,19 @@ def test_a_card_tells_no_change_that_was_taken_back(robolink_state, monkeypatch)
     ended("a", "N-1", EntryKind.DONE)
     ended("b", "N-2", EntryKind.DONE, EntryKind.ROLLED_BACK)
     found = standing_of(URL)
-    assert (found.last.who, found.last.needle) == ("Chen", "N-1")
+    assert (last_of(found).who, last_of(found).needle) == ("Chen", "N-1")
     assert not found.simulated
 
     ended("c", "N-3", EntryKind.DONE)
-    assert standing_of(URL, found).last.needle == "N-3", "what was found before outlived a change"
+    assert last_of(standing_of(URL, found)).needle == "N-3", (
+        "what was found before outlived a change"
+    )
 
 
 def test_a_stop_that_was_released_is_not_told_from_what_was_found_before(changed):
     before = standing_of(changed)
-    held = Standing(("open",), "stopped", before.last, before.unusual, before.newest)
-    found = standing_of(changed, held)
+    held: Any = {"interrupted": ("open",), "stopped": "stopped"}
+    found = standing_of(changed, replace(before, **held))
     assert (found.interrupted, found.stopped) == ((), None)
 
 

@@ -202,8 +202,8 @@ def card_of(
         card = replace(card, mark="look")
     # Of what the last job left the first line tells how it ended; the rest stands below.
     head, _, _ = "\n".join(said).partition("\n")
-    told = (*lines, *((head,) if head else ()), *card.lines, *standing.past())
-    return replace(card, lines=told, said=said)
+    shown = (*lines, *((head,) if head else ()), *card.lines, *standing.past())
+    return replace(card, lines=shown, said=said)
 
 
 def _mark(look: CellLook) -> str:

@@ -4,6 +4,7 @@ import asyncio
 import math
 import time
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from robolink_cli.panel import hub as hub_module
@@ -275,8 +276,9 @@ def test_a_tablet_that_is_heard_keeps_its_seat_however_long_a_job_takes(hub):
             return '{"t":"pong"}'
 
     access = SimpleNamespace(seats=seats, audit=SimpleNamespace(note=None))
-    panel = Panel(hub, None, access, None)
-    asyncio.run(panel._listen(Line(), Tablet().live))
+    parts: Any = (hub, None, access, None)
+    line: Any = Line()
+    asyncio.run(Panel(*parts)._listen(line, Tablet().live))
     assert seats.holder("line3", moving=False) is not None
     clock.sleep(SILENCE_S * 1.1)
     assert seats.holder("line3", moving=False) is None

@@ -56,8 +56,9 @@ def test_two_changes_are_rows_charts_and_pages_of_this_cell(changed):
 
 
 def last_of(found) -> LastChange:
-    assert found.last is not None
-    return found.last
+    last: LastChange | None = found.last
+    assert last is not None
+    return last
 
 
 def test_a_card_tells_the_last_change_and_works_the_drift_out_once(changed, monkeypatch):

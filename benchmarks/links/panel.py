@@ -22,7 +22,7 @@ from typing import Any, Final
 
 import websockets
 
-from benchmarks.links.panel_ends import EVERY_S, URL
+from benchmarks.links.panel_ends import EVERY_S, MOVING, URL
 from benchmarks.table import Amount, Figure
 
 TABLETS: Final = 20
@@ -68,7 +68,7 @@ def measure_panel() -> Iterator[Figure]:
     )
     wanted = Amount(60.0, "ms")
     yield Figure(
-        f"STOP to the Abort frame, {TABLETS} tablets watching, median of {STOPS}",
+        f"STOP to the Abort frame, robot moving, {TABLETS} tablets watching, median of {STOPS}",
         Amount(median(seen.stop_ms), "ms"),
     )
     late_ms = _of_100(seen.stop_ms, 99)
@@ -89,6 +89,7 @@ class _Seen:
     before_kb: float = 0.0
     processor_percent: float = 0.0
     length: int = 0
+    moving: bool = False
 
 
 class _Tablet:
@@ -156,13 +157,16 @@ async def _watched(port: int, pid: int, robot: "subprocess.Popen[bytes]") -> _Se
         late_ms = list(seen.late_ms)
         assert robot.stdout is not None  # noqa: S101 - it was asked for
         for number in range(STOPS):
+            while not seen.moving:
+                await asyncio.sleep(0.01)
             await asyncio.sleep(0.03)
             began_ns = time.perf_counter_ns()
             stop = {"t": "stop", "press": f"b{number}", "age_ms": 0}
             await line.send(json.dumps(stop))
             at_ns = int(await asyncio.to_thread(robot.stdout.readline))
             seen.stop_ms.append((at_ns - began_ns) / 1e6)
-            await asyncio.sleep(0.2)
+            await asyncio.sleep(0.3)
+            seen.moving = False
         seen.late_ms = late_ms
         for task in tasks:
             task.cancel()
@@ -180,6 +184,7 @@ async def _follow(line: Any, seen: _Seen) -> None:  # noqa: ANN401 - of websocke
             elif made := re.search(r"<span>(\d{12,})</span>", text):
                 seen.late_ms.append((now_ns - int(made[1])) / 1e6)
                 seen.length = len(text)
+                seen.moving = MOVING in text
 
 
 async def _floor(length: int) -> list[float]:

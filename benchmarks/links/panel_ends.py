@@ -1,4 +1,4 @@
-"""What stands around a measured panel: a robot, and a job that shows ten views a second.
+"""What stands around a measured panel: a robot that moves, and a job that shows ten views a second.
 
 ``python -m benchmarks.links.panel_ends robot`` serves a simulated controller and writes the time of
 each Abort; ``... panel ARGUMENT...`` runs the panel, whose jobs are the one in this module.
@@ -10,14 +10,20 @@ import socket
 import sys
 import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from robolink_cli.wizard.views.records import View
 
+    from robolink.model import Controller
+
 EVERY_S: Final = 0.1
 """Time between two views."""
+
+MOVING: Final = "running"
+"""State of the robot while it moves."""
 
 URL: Final = "BENCH_URL"
 """Variable with the controller that the job has."""
@@ -28,16 +34,24 @@ def serve_robot() -> None:
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.hosting.streams.epson import serve_tcp
 
-    from benchmarks.links.stopping import Tap
-
-    with serve_tcp(EpsonSimulator(seed=1)) as host:
-        tap = Tap(int(host.url.rpartition(":")[2]), lambda piece: b"$Abort" in piece)
-        print(f"epson+tcp://127.0.0.1:{tap.port}", flush=True)
+    with serve_tcp(EpsonSimulator(seed=1)) as host, socket.create_server(("127.0.0.1", 0)) as door:
+        print(f"epson+tcp://127.0.0.1:{door.getsockname()[1]}", flush=True)
         while True:
-            if tap.frame_ns:
-                print(tap.frame_ns, flush=True)
-                tap.reset()
-            time.sleep(0.0005)
+            near, _ = door.accept()
+            far = socket.create_connection(("127.0.0.1", int(host.url.rpartition(":")[2])))
+            for one in (near, far):
+                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            for one, other in ((near, far), (far, near)):
+                threading.Thread(target=_pass_on, args=(one, other), daemon=True).start()
+
+
+def _pass_on(near: socket.socket, far: socket.socket) -> None:
+    """Pass on what comes in; print the time of each Abort, which comes while a movement waits."""
+    with suppress(OSError), near, far:
+        while piece := near.recv(65536):
+            if b"$Abort" in piece:
+                print(time.perf_counter_ns(), flush=True)
+            far.sendall(piece)
 
 
 def run_panel(arguments: list[str]) -> None:
@@ -51,6 +65,7 @@ def run_panel(arguments: list[str]) -> None:
 
 def work(descriptor: int) -> None:
     """Have the controller, and show the time, until the line ends."""
+    from robolink_cli.wizard.views.records import Status
     from robolink_cli.wizard.views.wire import to_wire
 
     import robolink
@@ -58,10 +73,13 @@ def work(descriptor: int) -> None:
 
     line, url, view = socket.socket(fileno=descriptor), os.environ[URL], _touch()
 
+    moves = threading.Event()
+
     def show() -> None:
         while True:
             head = replace(view.head, title=str(time.perf_counter_ns()))
-            said = {"t": "view", "view": to_wire(replace(view, head=head))}
+            status = Status(MOVING if moves.is_set() else "ready", halted=False, age_s=0.0)
+            said = {"t": "view", "view": to_wire(replace(view, head=head, status=status))}
             try:
                 line.sendall(json.dumps(said).encode() + b"\n")
             except OSError:
@@ -70,8 +88,30 @@ def work(descriptor: int) -> None:
 
     with robolink.connect(url) as controller, StopListener(controller, url, who="a job"):
         threading.Thread(target=show, daemon=True).start()
+        threading.Thread(target=_keep_moving, args=(controller, moves), daemon=True).start()
         while (heard := line.recv(65536)) and b'"leave"' not in heard:
             pass
+
+
+def _keep_moving(controller: "Controller", moves: threading.Event) -> None:
+    """Move up and down, and again after each stop."""
+    from robolink.errors import StoppedError
+    from robolink.model import MotionProfile, Path, WorkBox
+
+    controller.motors(True)
+    group, up_mm = controller.groups[0], -20.0
+    while True:
+        here, up_mm = group.pose(), -up_mm
+        try:
+            motion = group.move_to(
+                replace(here, z_mm=here.z_mm + up_mm), MotionProfile(Path.STRAIGHT), box=WorkBox()
+            )
+            moves.set()
+            motion.wait(timeout_s=60)
+        except StoppedError:
+            moves.clear()
+            time.sleep(0.1)  # the stop is to have ended: only then is it released
+            controller.release_stop()
 
 
 def _touch() -> "View":

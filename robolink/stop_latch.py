@@ -39,6 +39,10 @@ __all__ = [
 ]
 
 
+_STOP_ENDS_S: Final = 10.0
+"""Longest wait in s for the end of a stop before it is released: five to rest, and its link."""
+
+
 class CommandClass(Enum):
     """What a request does to the machine."""
 
@@ -121,9 +125,22 @@ class StopLatch:
             self._stops.wait_for(lambda: not self._under_way, timeout_s)
 
     def release(self) -> None:
-        """Release the latch at a person's request."""
-        self._put_back.clear()
-        self._closed = False
+        """Release the latch at a person's request, once the stops in progress have ended.
+
+        A movement that began while another thread still stops would be met by that stop halfway.
+
+        Raises:
+            StoppedError: A stop does not end.
+        """
+        with self._stops:
+            if not self._stops.wait_for(lambda: not self._under_way, _STOP_ENDS_S):
+                raise StoppedError(
+                    tr("{controller} is still being stopped.", controller=self._controller),
+                    remedy=tr("Look at the robot. Release the stop when it has ended."),
+                    controller=self._controller,
+                )
+            self._put_back.clear()
+            self._closed = False
 
     def admit(self, kind: CommandClass, request: str) -> None:
         """Refuse ``request`` if a stop forbids it; called under the lock of its exchange.

@@ -31,6 +31,7 @@ from robolink.protocols.mailbox import Command, Opcode
 from robolink.stop_latch import CommandClass, StopLatch
 from robolink.stopping import clear_note, find_note, leave_note
 from robolink.timing import NS_PER_S
+from tests._patience import PATIENCE_S
 
 # The requests that a stop lets through, and from whom.
 
@@ -460,3 +461,21 @@ def test_half_an_answer_to_a_stop_is_told_from_none():
         TransportTimeoutError, match=r"sent only 4 bytes of its answer\.\n    Abort"
     ):
         over(wire).exchange("Abort")
+
+
+def test_a_stop_that_is_under_way_is_released_when_it_has_ended():
+    latch, opened = StopLatch("cell"), threading.Event()
+
+    def release():
+        latch.release()
+        opened.set()
+
+    with latch.stopping():
+        person = threading.Thread(target=release)
+        person.start()
+        assert not opened.wait(0.1)
+        with pytest.raises(StoppedError):
+            latch.admit(CommandClass.ACT, "Move")
+    person.join(PATIENCE_S)
+    assert opened.is_set()
+    latch.admit(CommandClass.ACT, "Move")

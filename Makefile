@@ -87,7 +87,7 @@ $(TYPE_JUDGE): $(VENV)/.installed-dev
 # Debian's chromium, or what `chromium` on PATH is. With NEED_CHROMIUM=1 a test that cannot run fails.
 .PHONY: panel
 panel: $(VENV)/.installed-browser ## Press the pages of the panel in a real browser; needs chromium and fonts-noto-cjk.
-	$(BIN)/python -m pytest -n 0 -m 'soak or not soak' tests/panel/browser
+	$(BIN)/python -m pytest -n 0 tests/panel/browser
 
 # NIGHT= hours; PARTS="docs peers" runs some. The parts and their shares: tools/nightly.py.
 NIGHT ?= 8

@@ -1,12 +1,11 @@
 """A real browser: Chromium, driven by Playwright. Without them these tests are skipped.
 
-``make panel`` runs them all. In ``make test``, where two processes share the computer, there are
-the whole change and STOP; the others count as what ``make soak`` takes.
+``make panel`` runs them, in a process of its own: what drives the browser keeps an event loop
+running, beside which no other test can run one.
 """
 
 import os
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -16,18 +15,6 @@ INSTALL = "apt-get install --no-install-recommends chromium fonts-noto-cjk; make
 """What brings both."""
 
 SIZES = {"1280": (1280, 800), "1024": (1024, 600)}
-
-
-IN_EVERY_RUN = ("test_a_whole_change_by_touch", "test_stop_in_a_movement")
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Leave what is long to ``make panel`` and ``make soak``."""
-    here = Path(__file__).parent
-    for item in items:
-        if here in item.path.parents and not item.name.startswith(IN_EVERY_RUN):
-            item.add_marker(pytest.mark.soak)
 
 
 def missing() -> str:

@@ -7,11 +7,15 @@ and as the command's docstring.
 
 import ast
 import inspect
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, Any, Final
 
 _HELP: Final = ("help", "short_help")
 _MAKERS: Final = ("command", "group")
+_HOLDS_ONE: Final = re.compile(rb"\b(tr|declared)\s*\(|\b(short_)?help\s*=|\b(command|group)\s*\(")
+"""Every module with a sentence has this; parsing the others would show nothing."""
+
 _Found = tuple[Any, ...]
 """Line, keyword, sentence and comments, in Babel's order."""
 
@@ -23,7 +27,10 @@ def collect(
     options: Mapping[str, Any],  # noqa: ARG001
 ) -> Iterator[_Found]:
     """Yield the sentences of a module; the form is Babel's."""
-    for node in ast.walk(ast.parse(file.read())):
+    source = file.read()
+    if not _HOLDS_ONE.search(source):
+        return
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Call):
             yield from _of_call(node, keywords)
         elif isinstance(node, ast.FunctionDef) and any(map(_makes, node.decorator_list)):

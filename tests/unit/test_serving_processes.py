@@ -70,6 +70,12 @@ with RareFullCollections(spare=0) as collections:
     assert collections.thaws == 1, "and what was found in use is what counts from then on"
 assert (gc.get_freeze_count(), gc.callbacks) == (0, before), "at the end all is as it was"
 
+usual = gc.get_threshold()
+gc.set_threshold(10_000, 10, 10)
+with RareFullCollections():
+    assert (gc.get_freeze_count(), gc.callbacks) == (0, before), "somebody else has decided"
+gc.set_threshold(*usual)
+
 gc.freeze()
 count = gc.get_freeze_count()
 with RareFullCollections():
@@ -85,11 +91,13 @@ def collector():
 
 @pytest.fixture
 def nothing_set_aside():
-    """As in a process that has frozen nothing; this one has."""
-    enabled = gc.isenabled()
+    """As in a process that has left its collector alone; this one has not."""
+    enabled, threshold = gc.isenabled(), gc.get_threshold()
     gc.disable()
     gc.unfreeze()
+    gc.set_threshold(700, 10, 10)
     yield
+    gc.set_threshold(*threshold)
     gc.freeze()
     if enabled:
         gc.enable()

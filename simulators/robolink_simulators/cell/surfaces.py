@@ -91,6 +91,10 @@ class SurfaceContact:
         """Return whether the tip is on the surface or inside."""
         return self.surface().height_mm(tip_mm) <= 0.0
 
+    def leeway_mm(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> float:  # noqa: ARG002 - the tip touches
+        """Return how far the tip is from the surface."""
+        return abs(self.surface().height_mm(tip_mm))
+
 
 STIFFNESS_N_PER_MM: Final = 100.0
 """Stiffness of a touched object, in N per mm of penetration by the tip (assumed)."""

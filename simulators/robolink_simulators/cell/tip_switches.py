@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 from robolink_simulators.cell.frames import cross, dot, subtract
 from robolink_simulators.cell.places import Direction, XyzMm
@@ -67,6 +67,28 @@ class TipSwitch(Protocol):
             tip_mm: Where its tip is.
             shaft: Which way its shaft goes from there, in base axes; of any length.
         """
+
+
+@runtime_checkable
+class MeasuredSwitch(TipSwitch, Protocol):
+    """A switch that also tells how far it is from changing."""
+
+    def leeway_mm(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> float:
+        """Return a distance within which a tip may go without changing it, its shaft parallel.
+
+        Args:
+            tip_mm: Where the tip is.
+            shaft: Which way its shaft goes from there, in base axes; of any length.
+        """
+
+
+def leeway_of(*inside_mm: float) -> float:
+    """Return the leeway of a switch that is on where all of some distances are positive.
+
+    Args:
+        inside_mm: Distances of which none changes by more than the tip goes.
+    """
+    return abs(min(inside_mm))
 
 
 def meets(
@@ -135,6 +157,18 @@ class LightBeam:
         beside_mm = abs(dot(to_beam, across)) / math.sqrt(area)
         return beside_mm <= self.nozzle_radius_mm + self.radius_mm
 
+    def leeway_mm(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> float:
+        """Return a distance within which the nozzle may go; 0 for a shaft along the beam."""
+        beam = self._way
+        to_beam, across = subtract(self.through_mm, tip_mm), cross(shaft, beam)
+        area = dot(across, across)
+        if area < _PARALLEL * dot(shaft, shaft):
+            return 0.0
+        length = math.sqrt(area)
+        above_mm = dot(cross(to_beam, beam), across) / length
+        beside_mm = abs(dot(to_beam, across)) / length
+        return leeway_of(above_mm, self.nozzle_radius_mm + self.radius_mm - beside_mm)
+
     def passes_at(self, tip_mm: XyzMm, shaft: Direction) -> float:
         """Return where along a shaft the beam passes it, in lengths of ``shaft``; not parallel."""
         across = cross(shaft, self._way)
@@ -155,6 +189,10 @@ class TouchPlate:
     def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:  # noqa: ARG002 - the tip touches
         """Return whether the tip touches it, or is below it."""
         return tip_mm[2] <= self.z_mm
+
+    def leeway_mm(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> float:  # noqa: ARG002 - the tip touches
+        """Return how far the tip is from its height."""
+        return leeway_of(self.z_mm - tip_mm[2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,3 +215,9 @@ class PinContact:
         x, y, z = self.pin_mm()
         beside_mm = math.hypot(tip_mm[0] - x, tip_mm[1] - y)
         return tip_mm[2] <= z and beside_mm <= self.radius_mm
+
+    def leeway_mm(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> float:  # noqa: ARG002 - the tip touches
+        """Return a distance within which the tip neither comes to the pin nor leaves it."""
+        x, y, z = self.pin_mm()
+        beside_mm = math.hypot(tip_mm[0] - x, tip_mm[1] - y)
+        return leeway_of(z - tip_mm[2], self.radius_mm - beside_mm)

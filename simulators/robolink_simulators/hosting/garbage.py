@@ -18,6 +18,9 @@ _SPARE: Final = 200_000
 again.
 """
 
+_USUAL: Final = (700, 2000)
+"""Threshold with which CPython begins, up to 3.12 and from 3.13 on."""
+
 _YOUNGEST: Final = 0
 _OLDEST: Final = 2
 
@@ -27,7 +30,8 @@ class RareFullCollections:
 
     For a program of which serving is all it does, as ``robolink sim``: it changes the collector
     of a whole process. So nothing that runs inside of somebody else's does so, neither fixtures
-    nor ``sim://``. Where something is set aside already its owner has decided, and nothing is done.
+    nor ``sim://``. Where something is set aside already, or the threshold is not CPython's own, its
+    owner has decided, and nothing is done.
 
     Args:
         spare: So many objects may be set aside besides twice those in use.
@@ -43,7 +47,8 @@ class RareFullCollections:
         self._thawed = self._decided = False
 
     def __enter__(self) -> "RareFullCollections":
-        self._decided = gc.get_freeze_count() == 0
+        # The threshold first: counting what somebody has set aside takes 100 ns for each object.
+        self._decided = gc.get_threshold()[0] in _USUAL and gc.get_freeze_count() == 0
         if self._decided:
             gc.freeze()
             self._in_use = self._set_aside = gc.get_freeze_count()

@@ -12,6 +12,7 @@ from itertools import accumulate
 from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
+from robolink.timing import NS_PER_S
 from robolink_simulators.device.wire_record import Place
 from robolink_simulators.epson.arm.kinematics import forward, hand_of, posture_of, tip_of
 from robolink_simulators.epson.arm.robots import Joints, Mechanism, RobotModel, check_ranges
@@ -20,6 +21,7 @@ from robolink_simulators.epson.arm.trajectory import (
     JointLeg,
     JointPace,
     Leg,
+    LineLeg,
     LinePace,
     plan_go,
 )
@@ -102,6 +104,14 @@ class _Travel:
 
     def leg_at(self, now_ns: int) -> Leg:
         return self._leg_at(now_ns)[0]
+
+    def within_until(self, now_ns: int, room_mm: float) -> int:
+        leg, elapsed_ns = self._leg_at(now_ns)
+        top_mm_s = leg.top_mm_s if isinstance(leg, LineLeg) else None
+        if top_mm_s is None:
+            return now_ns
+        left_ns = max(0, leg.duration_ns - elapsed_ns)
+        return now_ns + min(left_ns, int(room_mm / max(top_mm_s, _STILL) * NS_PER_S))
 
     def _leg_at(self, now_ns: int) -> tuple[Leg, int]:
         elapsed_ns = max(0, now_ns - self.start_ns)
@@ -207,6 +217,18 @@ class Arm:
             return self._seen_at(self._travel, now_ns)
         before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
         return forward(self.model, self._trailing(then, self._ways(before, then)))
+
+    def within_until(self, now_ns: int, room_mm: float) -> int:
+        """Return until when nothing that it carries leaves a place, nor turns.
+
+        Args:
+            now_ns: An instant of the motion in progress; it is returned where more is not known.
+            room_mm: How far from where it is at that instant the place reaches.
+        """
+        exact = not (self.backlash_deg or self.backlash_mm or any(self.origin_errors))
+        if self._travel is None or self.added_in_force or not exact or room_mm <= 0.0:
+            return now_ns
+        return self._travel.within_until(now_ns, room_mm)
 
     def _seen_at(self, travel: _Travel, now_ns: int) -> Pose:
         """Return where the flange is; a search asks in each millisecond, once for each beam."""

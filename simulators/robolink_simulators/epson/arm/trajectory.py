@@ -96,6 +96,8 @@ FULL_SPEED_AFTER_S: Final = 0.2
 
 _NO_TOOL: Final = ToolOffset()
 _STILL = 1e-9
+_NO_TURN_DEG = 1e-6
+"""Turn of a leg that counts as none: what rounding leaves."""
 _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
 _MOST_CHECKS = 2000
@@ -203,6 +205,17 @@ class LineLeg(RampedLeg):
     def flange_at(self, elapsed_ns: int) -> Pose:
         """Return the pose of the flange that long after the start."""
         return self._flange_after(self._share_at(elapsed_ns))
+
+    @property
+    def top_mm_s(self) -> float | None:
+        """Speed that nothing the flange carries exceeds, in mm/s; ``None`` where it turns."""
+        a, b = self.start, self.end
+        if abs(b.u_deg - a.u_deg) > _NO_TURN_DEG:
+            return None
+        if self.ramp is None:
+            return 0.0
+        ramp = self.ramp.ramp if isinstance(self.ramp, BrakedRamp) else self.ramp
+        return math.dist(a.coordinates()[:3], b.coordinates()[:3]) * ramp.peak_per_s
 
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the line."""

@@ -19,6 +19,7 @@ from robolink_simulators.cell.tip_switches import (
     STANDING,
     UPRIGHT,
     Lean,
+    MeasuredSwitch,
     Shaft,
     Shake,
     TipSwitch,
@@ -41,6 +42,9 @@ Sense = Callable[[int | None], bool]
 
 InputsAsked = dict[int, bool]
 """States of the inputs that were read, by number."""
+
+_ROUNDING_MM: Final = 0.001
+"""Part of a leeway that is not used: far more than rounding, or the turn that it leaves, takes."""
 
 
 class InputBits(BitBank):
@@ -144,6 +148,24 @@ class InputBits(BitBank):
         finally:
             self._instant_ns = before_ns
 
+    def last_until(self, asked: InputsAsked, instant_ns: int) -> int:
+        """Return until when inputs surely show what they show at an instant of the motion.
+
+        Those that are switched by hand stay as they are.
+
+        Args:
+            asked: The inputs.
+            instant_ns: The instant; it is returned where more is not known.
+        """
+        senses = [self._senses[number] for number in asked if number in self._senses]
+        return min(
+            (
+                sense.lasts_until(instant_ns) if isinstance(sense, TipInput) else instant_ns
+                for sense in senses
+            ),
+            default=instant_ns,
+        )
+
     @contextmanager
     def noting(self) -> Iterator[InputsAsked]:
         """Note which inputs are read inside the block, and what they showed."""
@@ -209,6 +231,8 @@ class TipInput:
         self._beside = beside
         self._latency_ns = round(latency_s * NS_PER_S)
         self._shake = Shake(noise_mm, rng)
+        # Determined once: asking a protocol costs more than an input.
+        self._measured = switch if isinstance(switch, MeasuredSwitch) else None
 
     def __call__(self, instant_ns: int | None) -> bool:
         """Return whether the input is on at an instant of the motion, ``None`` for now."""
@@ -217,10 +241,7 @@ class TipInput:
             flange = arm.true_flange()
         else:
             flange = arm.true_flange_at(instant_ns - self._latency_ns)
-        x_mm, y_mm, z_mm = tip_place(arm.model, flange, nozzle.tip)
-        dx_mm, dy_mm, dz_mm = self._shake.of(arm.moves_started)
-        place = self._beside(self._switch, (x_mm + dx_mm, y_mm + dy_mm, z_mm + dz_mm))
-        shaft = nozzle.shaft
+        place, shaft = self._place(flange, nozzle), nozzle.shaft
         return meets(
             self._switch,
             place,
@@ -228,6 +249,30 @@ class TipInput:
             bent_up_to_mm=shaft.bent_up_to_mm,
             upright=lambda: _way(arm.model, flange, nozzle.tip, UPRIGHT),
         )
+
+    def lasts_until(self, instant_ns: int) -> int:
+        """Return until when the input surely is as it is at an instant of the motion.
+
+        A search asks for thousands of instants, far from the switch most of them: so long as the
+        nozzle cannot get there nothing needs to be asked.
+
+        Args:
+            instant_ns: The instant; it is returned where more is not known.
+        """
+        arm, nozzle = self._arm, self._nozzle()
+        if self._measured is None or nozzle.shaft.bent_up_to_mm:
+            return instant_ns
+        then_ns = instant_ns - self._latency_ns
+        flange = arm.true_flange_at(then_ns)
+        way = _way(arm.model, flange, nozzle.tip, nozzle.shaft.lean)
+        leeway_mm = self._measured.leeway_mm(self._place(flange, nozzle), way)
+        return arm.within_until(then_ns, leeway_mm - _ROUNDING_MM) + self._latency_ns
+
+    def _place(self, flange: Pose, nozzle: Nozzle) -> XyzMm:
+        """Return where the tip is, seen from where the switch was mounted, scatter included."""
+        x_mm, y_mm, z_mm = tip_place(self._arm.model, flange, nozzle.tip)
+        dx_mm, dy_mm, dz_mm = self._shake.of(self._arm.moves_started)
+        return self._beside(self._switch, (x_mm + dx_mm, y_mm + dy_mm, z_mm + dz_mm))
 
 
 def _way(model: RobotModel, flange: Pose, tip: ToolOffset | None, lean: Lean) -> Direction:

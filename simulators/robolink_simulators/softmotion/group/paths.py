@@ -110,6 +110,7 @@ class LinePath:
     _turn: tuple[Vector, float] = field(init=False, repr=False, compare=False)
     _unturned: Matrix = field(init=False, repr=False, compare=False)
     _axes: JointPath = field(init=False, repr=False, compare=False)
+    _unturned_flange: Matrix | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # A movement evaluates its path in every cycle.
@@ -119,6 +120,7 @@ class LinePath:
         object.__setattr__(self, "_turn", (axis, angle_deg))
         object.__setattr__(self, "_unturned", product(about(axis, 0.0), a.rotation))
         object.__setattr__(self, "_axes", JointPath(self.start, self.end))
+        object.__setattr__(self, "_unturned_flange", None)
 
     def tcp_at(self, share: float) -> Frame:
         """Return the TCP after a share of the path."""
@@ -151,10 +153,32 @@ class LinePath:
 
     def _axes_for(self, tcp: Frame, share: float) -> AxisValues:
         near = self._axes.axes_at(share)
-        return axes_for_tcp(self.kinematics, tcp, self.tool, self.configuration, near=near)
+        rotation = self._flange_rotation(tcp)
+        return _axes_for(self.kinematics, tcp, self.tool, rotation, self.configuration, near=near)
+
+    def _flange_rotation(self, tcp: Frame) -> Matrix:
+        """Return how the flange stands; where the TCP does not turn it is asked for once."""
+        if tcp.rotation is not self._unturned:
+            return flange_rotation(self.kinematics, tcp, self.tool)
+        found = self._unturned_flange
+        if found is None:
+            found = flange_rotation(self.kinematics, tcp, self.tool)
+            object.__setattr__(self, "_unturned_flange", found)
+        return found
 
 
 Path = JointPath | LinePath
+
+
+def flange_rotation(kinematics: KinematicsModel, tcp: Frame, tool: Frame) -> Matrix:
+    """Return the flange's orientation that brings the TCP's as close as possible.
+
+    Raises:
+        Refused: No orientation is closest.
+    """
+    wanted = product(tcp.rotation, transposed(tool.rotation))
+    image = kinematics.orientation_image(wanted)
+    return wanted if image is None else image.m_ori_zero
 
 
 def axes_for_tcp(
@@ -173,9 +197,19 @@ def axes_for_tcp(
     Raises:
         Refused: Out of reach.
     """
-    wanted = product(tcp.rotation, transposed(tool.rotation))
-    image = kinematics.orientation_image(wanted)
-    rotation = wanted if image is None else image.m_ori_zero
+    rotation = flange_rotation(kinematics, tcp, tool)
+    return _axes_for(kinematics, tcp, tool, rotation, configuration, near=near)
+
+
+def _axes_for(
+    kinematics: KinematicsModel,
+    tcp: Frame,
+    tool: Frame,
+    rotation: Matrix,
+    configuration: Configuration,
+    *,
+    near: AxisValues,
+) -> AxisValues:
     flange = Frame(subtract(tcp.shift_mm, turned(rotation, tool.shift_mm)), rotation)
     return kinematics.axes_for(flange, configuration, near)
 

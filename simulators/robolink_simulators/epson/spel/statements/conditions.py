@@ -258,7 +258,8 @@ class Watch:
             if scan.holds(after_ns):
                 self._edge_ns = first_between(before_ns, after_ns, scan.holds)
                 return
-            before_ns = after_ns
+            alike = (scan.lasts_until(after_ns) - after_ns) // _SAMPLE_NS
+            before_ns = after_ns + alike * _SAMPLE_NS
 
     def edge_after(self, seen_ns: int) -> int | None:
         """Return when the condition is met, as far as that is known at ``seen_ns``."""
@@ -294,6 +295,10 @@ class Watch:
         """Return whether those inputs show at an instant what they showed."""
         return self._evaluator.session.machine.inputs.show(asked, instant_ns)
 
+    def lasts_until(self, asked: InputsAsked, instant_ns: int) -> int:
+        """Return until when those inputs surely show what they show at an instant."""
+        return self._evaluator.session.machine.inputs.last_until(asked, instant_ns)
+
 
 class _Scan:
     """Checks a condition repeatedly while nothing but the robot moves.
@@ -316,6 +321,12 @@ class _Scan:
         if self._asked is None or not self._watch.still(self._asked, instant_ns):
             self._held, self._asked = self._watch.value_and_inputs(instant_ns)
         return self._held
+
+    def lasts_until(self, instant_ns: int) -> int:
+        """Return until when the condition surely is what it is at the instant asked for last."""
+        if self._asked is None:
+            return instant_ns
+        return self._watch.lasts_until(self._asked, instant_ns)
 
 
 class DescentWatch:

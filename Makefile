@@ -57,7 +57,7 @@ endif
 # ROWS="F01 F25" takes some of them.
 ROWS :=
 .PHONY: faults
-faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print what it shows.
+faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F87, and print what it shows.
 	@$(BIN)/python -m tests.faults.catalogue $(ROWS)
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
@@ -191,7 +191,7 @@ $(VENV)/.installed-browser: $(VENV)/.installed-dev
 	touch $@
 
 $(VENV)/.installed: pyproject.toml $(VENV)/.created
-	$(BIN)/python -m pip install --quiet --editable '.[panel]'
+	$(BIN)/python -m pip install --quiet --editable '.[panel,eye]'
 	touch $@
 
 $(VENV)/.created:

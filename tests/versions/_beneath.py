@@ -12,15 +12,19 @@ FAILING: Final[Mapping[str, tuple[str, str]]] = {
 
 _OLDER: Final = "the releases beneath are older than Python 3.11"
 
+_RECENT: Final = "of what meets a network, only releases of the last two years are tried"
+
 REASONS: Final[Mapping[str, str]] = {
     "canopen": _OLDER,
-    "cryptography": "of what meets a network, only releases of the last two years are tried",
+    "cryptography": _RECENT,
     "jinja2": "the releases beneath have a published way out of the sandbox (CVE-2025-27516)",
     "keyring": _OLDER,
     "lark": _OLDER,
     "markupsafe": _OLDER,
     "msgpack": _OLDER,
     "numpy": _OLDER,
+    "opencv-python-headless": _RECENT,
+    "pillow": _RECENT,
     "platformdirs": _OLDER,
     "prompt_toolkit": _OLDER,
     "psycopg": _OLDER,
@@ -30,7 +34,7 @@ REASONS: Final[Mapping[str, str]] = {
     "rich": _OLDER,
     "starlette": "1.0 is the first release whose interface is promised to stay",
     "uvicorn": "the releases beneath take no context of TLS that was made before",
-    "websockets": "of what meets a network, only releases of the last two years are tried",
+    "websockets": _RECENT,
 }
 """Why a lower one was not tried although the tests might pass with it.
 

@@ -17,8 +17,15 @@ NEVER: Final = ("dev", "browser", "docs")
 PYTHONS: Final = ("3.11", "3.12", "3.13", "3.14")
 """The versions of Python that ``make versions`` looks for, the lowest first."""
 
-UNTRIED: Final = {"newest-3.14": frozenset({"cryptography", "starlette", "uvicorn", "websockets"})}
-"""Packages that a run has not had yet: the panel came after it, and the machine had no such Python.
+UNTRIED: Final = {
+    "newest-3.14": frozenset(
+        {
+            *("cryptography", "starlette", "uvicorn", "websockets"),
+            *("opencv-python-headless", "pillow"),
+        }
+    )
+}
+"""Packages that a run has not had yet: they came after it, and the machine had no such Python.
 """
 
 _CLASSIFIER: Final = "Programming Language :: Python :: 3."
@@ -37,7 +44,7 @@ def run_time_dependencies() -> list[Requirement]:
     lines = [*declared["dependencies"]]
     for extra, wanted in declared["optional-dependencies"].items():
         lines += wanted if extra not in NEVER else []
-    return [Requirement(line) for line in lines]
+    return [Requirement(line) for line in dict.fromkeys(lines)]  # two extras want Pillow
 
 
 def lowest(requirement: Requirement) -> Version:

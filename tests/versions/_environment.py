@@ -37,6 +37,7 @@ CHOSEN: Final = (
     "tests/cli/test_refusals_of_every_command.py",
     "tests/cli/test_report_command.py",
     "tests/cli/wizard",
+    "tests/eye",
     "tests/panel/access/test_tls_product.py",
     "tests/panel/server",
     "tests/unit/structured_text/test_st_language.py",

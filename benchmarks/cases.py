@@ -23,6 +23,7 @@ CASES: Final = {
     "kinematics": "work.kinematics",
     "spel-programs": "work.spel_programs",
     "plc-program": "work.plc_program",
+    "eye": "work.eye",
 }
 """Modules of the cases by name. The dependencies of a case are imported when it runs."""
 

@@ -27,6 +27,7 @@ TITLES: Final = {
     "kinematics": "Kinematics of the simulated robot",
     "spel-programs": "SPEL+ programs",
     "plc-program": "The PLC program",
+    "eye": "The finder of tips",
 }
 
 NOTES: Final = {
@@ -53,6 +54,7 @@ NOTES: Final = {
     "panel": "Robot, panel and job are processes of their own. The parts of a page are drawn"
     "\nonce for all tablets that see the same, here twice: for the one that has the seat,"
     "\nand for those that watch.",
+    "eye": "The pictures are drawings. Where no radius is stated, all sizes are tried.",
     "solvers": "Where lstsq with covariance is the floor, it starts from arrays. A calibration"
     "\ngets poses, each with a hand, a tool and a local: to read and compare these"
     "\ntakes 115 us for 1,000 poses on four axes, a quarter of the whole. Each side"

@@ -6,29 +6,45 @@ The cameras themselves are brought by other packages through the entry-point gro
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 from statistics import median
 from typing import Final, Protocol, cast
 from urllib.parse import parse_qs, urlsplit
 
+from robolink import runtime
 from robolink.errors import CalibrationError, ConfigError, OutcomeUnknownError, StoppedError
 from robolink.messages import joined, known_names, tr
-from robolink.model import TIP, Controller, LookingController, Spot, SpotUnit, TipSensor
+from robolink.model import (
+    TIP,
+    Controller,
+    ExplainsMisses,
+    LookingController,
+    LooksAtRest,
+    Spot,
+    SpotUnit,
+    TipSensor,
+    sensor_address,
+)
 from robolink.plug_ins import PlugInError, find_plug_in
+from robolink.timing import NS_PER_S
 
 __all__ = [
+    "PATIENT_S",
     "SENSORS_GROUP",
     "SensorOpener",
+    "UNSEEN",
     "VISION_GUIDE",
     "VisionGuideCamera",
     "median_spot",
     "open_sensor",
     "scatter_of",
+    "seen_at_place",
     "seen_in",
     "seen_once",
     "sensor_name",
+    "stale_picture",
 ]
 
 _QUARTER_OF_DIFFERENCES: Final = 0.4506
@@ -49,7 +65,8 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
         CalibrationError: ``tip_not_seen`` or ``fiducial_not_seen``: not in most of the pictures;
             ``several_tips_seen`` or ``several_fiducials_seen``: more than one at a time;
             ``non_finite``: the camera answers with something that is no place;
-            ``sensor_failed``: it does not answer.
+            ``sensor_failed``: it does not answer; and whatever the camera itself gives as the
+            reason, such as ``tip_cut`` (:class:`~robolink.model.ExplainsMisses`).
 
     Example:
         >>> from types import SimpleNamespace
@@ -87,8 +104,7 @@ def seen_in(sensor: TipSensor, mark: int, *, pictures: int) -> tuple[Spot, ...]:
         [312.3, 312.4]
     """
     spots = list[Spot]()
-    for _ in range(pictures):
-        found = _seen(sensor, mark)
+    for found in _looked(sensor, mark, pictures):
         if len(found) > 1:
             raise _several(mark, found)
         for spot in found:
@@ -97,6 +113,86 @@ def seen_in(sensor: TipSensor, mark: int, *, pictures: int) -> tuple[Spot, ...]:
     if 2 * len(spots) <= pictures:
         raise _not_seen(mark, sensor, len(spots), pictures)
     return tuple(spots)
+
+
+def seen_at_place(
+    sensor: TipSensor, mark: int, pictures: int, wait: Callable[[], None]
+) -> tuple[Spot, ...]:
+    """Return what :func:`seen_in` returns, of a mark that has to be in the picture.
+
+    A camera that works on pictures of its own and does not see it is asked again, a bounded number
+    of times: what comes later and stays shows that pictures are late.
+
+    Args:
+        sensor: The camera.
+        mark: What is looked for.
+        pictures: How many are taken.
+        wait: Lets the time pass that the camera needs before a look.
+
+    Raises:
+        CalibrationError: As :func:`seen_in`; ``stale_picture``.
+    """
+    try:
+        return seen_in(sensor, mark, pictures=pictures)
+    except CalibrationError as error:
+        if error.code in _NOT_THERE and isinstance(sensor, LooksAtRest):
+            _require_on_time(sensor, mark, wait)
+        raise
+
+
+def _require_on_time(sensor: TipSensor, mark: int, wait: Callable[[], None]) -> None:
+    """Refuse the pictures of a camera that did not see a mark and sees it now."""
+    begun_ns, seen, late = runtime.monotonic_ns(), 0, None
+    for _ in range(_REPEATED_LOOKS):
+        wait()
+        try:
+            seen_in(sensor, mark, pictures=1)
+        except CalibrationError as error:
+            if error.code not in UNSEEN:
+                raise
+            seen = 0
+            continue
+        late = late if seen and late else stale_picture(begun_ns)
+        seen += 1
+        if seen == _STAYS:
+            raise late
+
+
+def stale_picture(since_ns: int) -> CalibrationError:
+    """Return the refusal of pictures that show where the robot was before.
+
+    Args:
+        since_ns: Reading of :func:`robolink.runtime.monotonic_ns` when the robot had stopped.
+    """
+    lag_s = (runtime.monotonic_ns() - since_ns) / NS_PER_S
+    return CalibrationError(
+        "stale_picture",
+        tr(
+            "The pictures are old: the camera showed the tip's new place {lag:.1f} s after the "
+            "robot had stopped.",
+            lag=lag_s,
+        ),
+        remedy=tr(
+            "Let the camera deliver single pictures instead of a buffered stream, or learn the "
+            "station, which measures the delay."
+        ),
+    )
+
+
+_NOT_THERE: Final = frozenset(
+    {"tip_not_seen", "fiducial_not_seen", "tip_cut", "out_of_focus"}
+    | {"picture_dark", "picture_overexposed"}
+)
+
+UNSEEN: Final = _NOT_THERE | {"several_tips_seen", "several_fiducials_seen"}
+"""Refusals of a look that say nothing of another place, or of a later picture."""
+
+PATIENT_S: Final = 0.5
+"""Least time between two looks that are repeated, in s: eight of them cover a delay of 4 s."""
+
+_REPEATED_LOOKS: Final = 8
+_STAYS: Final = 3
+"""Looks in a row in which a mark has to be seen that was not seen when the robot arrived."""
 
 
 def median_spot(spots: Sequence[Spot]) -> Spot:
@@ -127,14 +223,21 @@ def scatter_of(spots: Sequence[Spot]) -> float | None:
     return differences[len(differences) // 4] / _QUARTER_OF_DIFFERENCES
 
 
-def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
-    # Covers anything that a camera's driver raises: an error must neither leave the tip down in
-    # front of the lens, nor be mistaken for a failure of the controller's link. A stop and an
-    # unknown outcome keep their own types, because a camera that is read through the controller can
-    # raise both.
+def _looked(sensor: TipSensor, mark: int, pictures: int) -> Iterator[Sequence[Spot]]:
+    """Yield what is seen in each picture.
+
+    Covers anything that a camera's driver raises: an error must neither leave the tip down in front
+    of the lens, nor be mistaken for a failure of the controller's link. A stop and an unknown
+    outcome keep their own types, because a camera that is read through the controller can raise
+    both; and what a camera refuses by name keeps that name.
+    """
     try:
-        return sensor.see(mark)
-    except (StoppedError, OutcomeUnknownError):
+        if isinstance(sensor, LooksAtRest):
+            yield from sensor.look_at_rest(mark, pictures)
+            return
+        for _ in range(pictures):
+            yield sensor.see(mark)
+    except (CalibrationError, StoppedError, OutcomeUnknownError):
         raise
     except Exception as error:
         raise CalibrationError(
@@ -165,6 +268,9 @@ def _require_finite(spot: Spot, sensor: TipSensor) -> None:
 
 
 def _not_seen(mark: int, sensor: TipSensor, seen: int, pictures: int) -> CalibrationError:
+    explained = sensor.why_unseen(mark) if isinstance(sensor, ExplainsMisses) else None
+    if explained is not None:
+        return explained
     where = tr(
         "{camera}: seen in {seen} of {pictures} pictures.",
         camera=sensor.identity,
@@ -303,6 +409,9 @@ def open_vision_guide(url: str) -> VisionGuideCamera:
 
 SENSORS_GROUP: Final = "robolink.sensors"
 
+_OWN_EYE: Final = "robolink.eye."
+"""Beginning of the modules whose cameras are named by the address of their pictures."""
+
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9+._-]*(?=://|\?|$)", re.ASCII)
 
 
@@ -344,12 +453,9 @@ def open_sensor(url: str | TipSensor) -> Iterator[TipSensor]:
 def sensor_name(sensor: str | TipSensor) -> str:
     """Return the camera's name in a sentence or a record: its name, or its own identity.
 
-    Of a URL that part is left out that stands before ``@``: a user, a password or a token.
+    What is secret in a URL is left out; see :func:`robolink.model.sensor_address`.
     """
-    name = sensor if isinstance(sensor, str) else sensor.identity
-    scheme, separator, rest = name.partition("://")
-    place, slash, path = rest.partition("/")
-    return f"{scheme}{separator}{place.rpartition('@')[2]}{slash}{path}"
+    return sensor_address(sensor if isinstance(sensor, str) else sensor.identity)
 
 
 def _opener(url: str) -> SensorOpener:
@@ -371,15 +477,20 @@ def _opener(url: str) -> SensorOpener:
     if found is None:
         from importlib import metadata  # slower to import than the rest of this package
 
-        known = sorted({*metadata.entry_points(group=SENSORS_GROUP).names, VISION_GUIDE})
+        entries = metadata.entry_points(group=SENSORS_GROUP)
+        own = sorted({f"{entry.name}://" for entry in entries if entry.value.startswith(_OWN_EYE)})
+        known = {entry.name for entry in entries if not entry.value.startswith(_OWN_EYE)}
         raise CalibrationError(
             "sensor_not_found",
             tr("No sensor is called {url!r}.", url=sensor_name(url)),
             remedy=joined(
                 " ",
                 (
-                    known_names(known, sensor_name(url)),
-                    tr("Name others in the cell file under sensors, or install their package."),
+                    known_names(sorted(known | {VISION_GUIDE}), sensor_name(url)),
+                    tr(
+                        "Or give the address of a picture ({schemes}), or install a package.",
+                        schemes=", ".join(own),
+                    ),
                 ),
             ),
         )

@@ -139,7 +139,14 @@ MOST_FURTHER: Final = 3
 would prove nothing."""
 
 
-_INSTRUMENT: Final = frozenset({"no_edge", "sensor_failed", "tip_not_seen", "fiducial_not_seen"})
+_INSTRUMENT: Final = frozenset(
+    {
+        *("no_edge", "sensor_failed", "tip_not_seen", "fiducial_not_seen", "tip_cut"),
+        *("out_of_focus", "camera_gone", "camera_taken", "camera_refused", "packets_lost"),
+        *("picture_late", "picture_unreadable", "stale_picture", "picture_dark"),
+        "picture_overexposed",
+    }
+)
 """Codes of measurements that ended because a sensor or camera detected nothing."""
 
 

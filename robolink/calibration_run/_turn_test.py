@@ -35,6 +35,7 @@ from robolink.methods import find_method
 from robolink.model import Controller, EntryKind, require_engineer
 from robolink.procedures import TOUCH_CODES
 from robolink.runner import ChoiceRow, OfferedChoice
+from robolink.stations import TAUGHT
 
 Choosing = Callable[[str, OfferedChoice], int]
 """Asks a person and returns the index of the chosen row, as :meth:`robolink.runner.Runner.choose`.
@@ -99,7 +100,8 @@ def relearning_commands(
     if kind is None:
         return ()
     learnt = outcomes.recorded(kinds=(EntryKind.STATION,))
-    by = next((one.tool for one in learnt if one.details.get("station") == station), None)
+    where = (one for one in learnt if one.details.get("station") == station)
+    by = next((one.tool for one in where if TAUGHT not in one.details), None)
     known_tool = None if by == plan.tool else by
     return learning_commands(station, kind, tool=plan.tool, known_tool=known_tool)
 

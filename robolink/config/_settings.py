@@ -119,6 +119,13 @@ class CameraSettings(_Station):
         sensor: Name or URL of the camera.
         mm_per_px: What a pixel is in the base, where that is known without robolink: two rows.
         origin_mm: Base point that is seen at pixel (0, 0), likewise.
+        diameter_mm: Diameter of the face of the tips that come before it, for robolink's own
+            finder.
+        bore: Whether those tips have a hole in the middle; a missing one is for yes.
+        polarity: How their face differs from what is around it.
+        marks: What the fiducials of a held board look like.
+        mark_mm: Diameter of a round fiducial, else its width.
+        exposure_us: Exposure time in microseconds, where the camera can be told it.
         place_mm, camera_turn_deg, camera_scale_percent, tip_image_px, print_mm: What is stated of
             these rows for this camera, half widths.
     """
@@ -132,6 +139,12 @@ class CameraSettings(_Station):
         Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=2)] | None
     ) = None
     origin_mm: Annotated[Pair | None, Field(validate_default=True)] = None
+    diameter_mm: Annotated[float, Field(gt=0, le=100)] | None = None
+    bore: bool | None = None
+    polarity: Literal["bright", "dark", "either"] | None = None
+    marks: Literal["round", "cross", "aruco", "aruco-5x5", "aruco-6x6", "aruco-7x7"] | None = None
+    mark_mm: Annotated[float, Field(gt=0, le=100)] | None = None
+    exposure_us: Annotated[float, Field(gt=0, le=10_000_000)] | None = None
     place_mm: Positive | None = None
     camera_turn_deg: Positive | None = None
     camera_scale_percent: Positive | None = None

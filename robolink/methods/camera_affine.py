@@ -312,7 +312,7 @@ class CameraAffineSource(LookSource):
 
     def opened(self) -> AbstractContextManager[TipSensor]:
         """Open the camera, which answers in pixels; see :func:`pixel_camera`."""
-        return pixel_camera(self.sensor)
+        return pixel_camera(self.sensor, self.station)
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""

@@ -108,10 +108,16 @@ if TYPE_CHECKING:
     from robolink.model._status import ControllerStatus as ControllerStatus
     from robolink.model._tip_sensor import TIP as TIP
     from robolink.model._tip_sensor import ControllerSensor as ControllerSensor
+    from robolink.model._tip_sensor import ExplainsMisses as ExplainsMisses
+    from robolink.model._tip_sensor import KeepsPictures as KeepsPictures
     from robolink.model._tip_sensor import LookingController as LookingController
+    from robolink.model._tip_sensor import LooksAtRest as LooksAtRest
+    from robolink.model._tip_sensor import NamesDoubts as NamesDoubts
     from robolink.model._tip_sensor import Spot as Spot
     from robolink.model._tip_sensor import SpotUnit as SpotUnit
+    from robolink.model._tip_sensor import StationSensor as StationSensor
     from robolink.model._tip_sensor import TipSensor as TipSensor
+    from robolink.model._tip_sensor import sensor_address as sensor_address
     from robolink.model._tools import ANY as ANY
     from robolink.model._tools import COMPONENTS as COMPONENTS
     from robolink.model._tools import Expect as Expect
@@ -171,7 +177,10 @@ else:
                 "begun_in_words new_operation"
             ),
             "_status": "ControllerState ControllerStatus",
-            "_tip_sensor": "ControllerSensor LookingController Spot SpotUnit TIP TipSensor",
+            "_tip_sensor": (
+                "ControllerSensor ExplainsMisses KeepsPictures LookingController LooksAtRest "
+                "NamesDoubts Spot SpotUnit StationSensor TIP TipSensor sensor_address"
+            ),
             "_tools": (
                 "ANY COMPONENTS Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
                 "ToolTable describe_offset of_no_tool plain_offset put_right "

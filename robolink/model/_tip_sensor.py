@@ -1,11 +1,15 @@
 """Sees a tip from a distance: a camera, as a procedure uses it."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
 
 from robolink.model._controller import Controller
+
+if TYPE_CHECKING:
+    from robolink.errors import CalibrationError
 
 TIP: Final = 0
 """Mark that stands for the tip; fiducials of a held board count from 1."""
@@ -37,6 +41,49 @@ class Spot:
     y: float
     radius_px: float | None = None
     score: float | None = None
+
+
+def sensor_address(text: str) -> str:
+    """Return a camera's name or URL without anything that is secret.
+
+    A user, a password or a token before ``@`` is left out. Of a web address those options
+    keep their values that say which picture is meant, and no others: cameras take passwords there,
+    too.
+
+    Args:
+        text: The name or URL.
+
+    Example:
+        >>> from robolink.model import sensor_address
+        >>> sensor_address("http://me:secret@camera.local/snap?channel=2&pwd=secret")
+        'http://camera.local/snap?channel=2&pwd=...'
+    """
+    scheme, separator, rest = text.partition("://")
+    rest, question, query = rest.partition("?")
+    place, slash, path = rest.partition("/")
+    if "@" in path and _HALF_A_PASSWORD.search(place):
+        place, path = "", f"@{path}"  # a slash in the password
+        place, slash, path = path.rpartition("@")[2].partition("/")
+    if question and _WEB.match(scheme):
+        query = "&".join(_option(one) for one in query.split("&"))
+    return f"{scheme}{separator}{place.rpartition('@')[2]}{slash}{path}{question}{query}"
+
+
+def _option(text: str) -> str:
+    key, equals, value = text.partition("=")
+    if equals and not _SECRET.search(key) and _SHORT.fullmatch(value):
+        return text
+    return f"{key}{equals}..." if equals else "..."
+
+
+_WEB: Final = re.compile(r"(?:[a-z0-9.-]+\+)?(?:https?|rtsps?)$", re.IGNORECASE)
+_HALF_A_PASSWORD: Final = re.compile(r":(?!\d*$)(?![^\[]*\])")
+_SECRET: Final = re.compile(
+    "user|usr|login|name|pass|pwd|psw|key|token|auth|sid|session|secret|sign|code|pin|hash|cred",
+    re.IGNORECASE,
+)
+_SHORT: Final = re.compile(r"[0-9.]{1,4}|[0-9]{2,4}[xX][0-9]{2,4}|jpe?g|png|bmp|pgm|true|false")
+"""Values that say which picture is meant: a number, a size, a format."""
 
 
 class TipSensor(Protocol):
@@ -87,6 +134,64 @@ class ControllerSensor(Protocol):
         Raises:
             ConfigError: This controller has no such camera.
         """
+
+
+@runtime_checkable
+class StationSensor(Protocol):
+    """A :class:`TipSensor` that has to know what is stated and taught of its station."""
+
+    def at_station(self, details: Mapping[str, object], mm_per_px: float | None) -> TipSensor:
+        """Return it for a station; the two share one open camera. Takes a picture.
+
+        Args:
+            details: What is stated and taught of the station, plain JSON.
+            mm_per_px: Length of a pixel, ``None`` where that is not known yet.
+
+        Raises:
+            ConfigError: What it has to know is not stated.
+            CalibrationError: The camera delivers no picture that can be used.
+        """
+
+
+@runtime_checkable
+class LooksAtRest(Protocol):
+    """A :class:`TipSensor` that makes sure itself that its pictures are not older than a look."""
+
+    def look_at_rest(self, mark: int, pictures: int) -> Sequence[Sequence[Spot]]:
+        """Return what :meth:`TipSensor.see` returns, for each of the pictures of one look.
+
+        Args:
+            mark: What is looked for.
+            pictures: How many; the robot stands still until the last of them.
+        """
+
+
+@runtime_checkable
+class ExplainsMisses(Protocol):
+    """A :class:`TipSensor` that can tell why it saw nothing."""
+
+    def why_unseen(self, mark: int) -> "CalibrationError | None":
+        """Return why a mark was not seen in the last look, ``None`` for no known reason."""
+
+
+@runtime_checkable
+class KeepsPictures(Protocol):
+    """A :class:`TipSensor` that keeps pictures of its looks, for the report of a change."""
+
+    def of_change(self, change: str) -> None:
+        """Note for which tool change pictures are taken from now on.
+
+        Args:
+            change: Its id; empty for none.
+        """
+
+
+@runtime_checkable
+class NamesDoubts(Protocol):
+    """A :class:`TipSensor` that can tell what speaks against its looks, though they count."""
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return the codes of the doubts in all looks so far, as results have them."""
 
 
 @runtime_checkable

@@ -3,14 +3,16 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final
 
 from robolink.calibration import carrying, tip_did_not_move, toward_zero
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset
 from robolink.procedures.camera_watch import SpotWatch
+from robolink.procedures.picture_lateness import LookAgain, PictureLateness
 from robolink.runner import Look, Move, Notify, Procedure, SeenAt, first_clear
+from robolink.sensing import UNSEEN
 from robolink.stations import CameraStation
 
 HALF_ROUND_DEG: Final = (0.0, 60.0, 120.0, 180.0)
@@ -62,10 +64,9 @@ _NEARER: Final = (1.0, 0.5, 0.25)
 """Shares of the distance beside a place, tried in turn if the spot is not seen at the full
 distance."""
 
-_UNSEEN: Final = frozenset(
-    {"tip_not_seen", "fiducial_not_seen", "several_tips_seen", "several_fiducials_seen"}
-)
-"""Refusals of a picture beside a place after which a picture nearer to the place is tried."""
+
+_UNEXPLAINED: Final = frozenset({"tip_not_seen", "fiducial_not_seen"})
+"""Refusals of a picture beside a place that give no reason of their own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +135,8 @@ class CameraDrive:
 
         Raises:
             CalibrationError: ``tip_not_seen``, ``several_tips_seen`` and their like;
-                ``tip_did_not_move``, ``camera_changed``, ``spot_changed``; with the frame lifted.
+                ``tip_did_not_move``, ``camera_changed``, ``spot_changed``, ``stale_picture``; with
+                the frame lifted.
 
         Example:
             >>> from robolink.model import Pose, ToolOffset
@@ -160,7 +162,11 @@ class CameraDrive:
             beside = yield from self._look_beside(place)
             here, before_camera = self.pose(place), True
             yield from self._approach(here)
-            look = yield from self._look(place)
+            try:
+                look = yield from self._look(place)
+            except CalibrationError:
+                yield from self.lifted(place)
+                raise
             seen.append((yield from self._witnessed(place, beside, look)))
         return seen
 
@@ -168,25 +174,53 @@ class CameraDrive:
         """Return a look whose spot is confirmed to have moved with the robot.
 
         Raises:
-            CalibrationError: ``tip_did_not_move``, ``camera_changed``, ``spot_changed``.
+            CalibrationError: ``tip_did_not_move``, ``camera_changed``, ``spot_changed``,
+                ``stale_picture``.
         """
+        approach_mm = math.hypot(self.plan.beside_mm, self.plan.beside_mm)
+        lateness = PictureLateness(self.watch, approach_mm)
+        try:
+            return (yield from self._followed(place, beside, look, lateness))
+        except CalibrationError as error:
+            yield from self.lifted(place)
+            reason = lateness.reason(error)
+            if reason is error:
+                raise
+            raise reason from error
+
+    def _followed(
+        self, place: Place, beside: SeenAt | None, look: SeenAt, lateness: PictureLateness
+    ) -> Procedure[SeenAt]:
         watch, mark = self.watch, place.mark
         if beside is None or not watch.follows(mark, beside, look):
-            pair = yield from self._more_closely(place)
+            again = self._looks_again(place, self.pose(place))
+            yield from lateness.of_a_spot(mark, beside, look, again)
+            pair = yield from self._more_closely(place, lateness)
+            # In pixels, movements are only compared with each other: all may be late.
+            if lateness.found is not None and not watch.in_mm(look):
+                raise lateness.found
             if beside is not None:
                 watch.learn_play(beside, look)
             beside, look = pair
         earlier = watch.known_before(mark, place.u_deg, look)
         if earlier is not None and not watch.follows(mark, earlier, look):
-            pair = yield from self._again(place, earlier)
+            pair = yield from self._again(place, earlier, lateness)
             if not watch.follows(mark, *pair):
-                yield from self.lifted(place)
                 raise watch.refusal(mark, [(earlier, look), pair])
             look = pair[1]
         watch.keep(mark, place.u_deg, beside, look)
         return look
 
-    def _more_closely(self, place: Place) -> Procedure[tuple[SeenAt, SeenAt]]:
+    def _looks_again(self, place: Place, at: Pose) -> LookAgain:
+        def again() -> Procedure[SeenAt | None]:
+            now: SeenAt | None = yield from self._seen(place, at, 1, repeated=True)
+            return now
+
+        return again
+
+    def _more_closely(
+        self, place: Place, lateness: PictureLateness
+    ) -> Procedure[tuple[SeenAt, SeenAt]]:
         """Look beside a place and at it with all pictures, both approached from the same side.
 
         From nearer where nothing is seen at the whole distance, and where what is seen moves by
@@ -206,11 +240,11 @@ class CameraDrive:
             try:
                 before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
             except CalibrationError as error:
-                if error.code not in _UNSEEN:
-                    yield from self.lifted(place)
+                if error.code not in UNSEEN:
                     raise
-                unseen = error if error.code.startswith("several") else unseen
+                unseen = unseen if error.code in _UNEXPLAINED else error
                 continue
+            yield from lateness.at_rest(before, self._looks_again(place, start))
             yield from self._approach(at)
             pair = before, (yield from self._look(place))
             # A shorter distance has a wider tolerance: what was wrong over the full distance must
@@ -219,22 +253,21 @@ class CameraDrive:
                 watch.alike(pair, other) for other in wrong
             ):
                 return pair
+            yield from lateness.at_rest(pair[1], self._looks_again(place, at))
             wrong.append(pair)
             if len(wrong) == 2 or watch.stands_still(place.mark, *pair):
                 break
-        yield from self.lifted(place)
         raise watch.refusal(place.mark, wrong) if wrong else unseen
 
-    def _again(self, place: Place, earlier: SeenAt) -> Procedure[tuple[SeenAt, SeenAt]]:
+    def _again(
+        self, place: Place, earlier: SeenAt, lateness: PictureLateness
+    ) -> Procedure[tuple[SeenAt, SeenAt]]:
         """Look where a mark was seen before, and at its place, both approached from one side."""
         start, at = self._at_place(place, earlier), self.pose(place)
         yield Notify(_in_doubt())
         yield from self._met(start)
-        try:
-            before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
-        except CalibrationError:
-            yield from self.lifted(place)
-            raise
+        before = yield from self._seen(place, start, self.plan.pictures)
+        yield from lateness.at_rest(before, self._looks_again(place, start))
         yield from self._met(at)
         return before, (yield from self._look(place))
 
@@ -258,25 +291,29 @@ class CameraDrive:
         beside = self._beside(place)
         pictures = self.plan.pictures if self._measures_pixels else 1
         try:
-            return (yield from self._seen(place, beside, pictures))
+            look: SeenAt = yield from self._seen(place, beside, pictures)
         except CalibrationError as error:
-            if error.code in _UNSEEN:
+            if error.code in UNSEEN:
                 return None
             yield Move(self._above(beside), Path.STRAIGHT, tr("Lifting off the camera."))
             raise
+        return look
 
-    def _seen(self, place: Place, at: Pose, pictures: int) -> Procedure[SeenAt]:
-        """Take pictures with the frame at a pose beside a place."""
+    def _seen(
+        self, place: Place, at: Pose, pictures: int, *, repeated: bool = False
+    ) -> Procedure[Any]:
+        """Take pictures with the frame at a pose beside a place; ``None`` for no repeated look."""
         middle, there = self._middle(place), self.pose(place)
         expected_mm = (middle[0] + at.x_mm - there.x_mm, middle[1] + at.y_mm - there.y_mm)
-        look: SeenAt = yield Look(
+        look: SeenAt | None = yield Look(
             tr("Checking whether the spot moves with the tip."),
             expected_mm,
             place.mark,
             pictures,
             in_pixels=not self.calibrated,
+            repeated=repeated,
         )
-        return self.watch.heard(look)
+        return None if look is None else self.watch.heard(look)
 
     def centred(
         self, places: Sequence[Place], here: Pose, found: Callable[[Sequence[SeenAt]], ToolOffset]
@@ -400,17 +437,14 @@ class CameraDrive:
             if place.mark == TIP
             else tr("Looking at fiducial {n}.", n=place.mark)
         )
-        try:
-            seen: SeenAt = yield Look(
-                purpose,
-                self._middle(place),
-                place.mark,
-                self.plan.pictures,
-                in_pixels=not self.calibrated,
-            )
-        except CalibrationError:
-            yield from self.lifted(place)
-            raise
+        seen: SeenAt = yield Look(
+            purpose,
+            self._middle(place),
+            place.mark,
+            self.plan.pictures,
+            in_pixels=not self.calibrated,
+            awaited=True,
+        )
         told, score = self._told(seen, self._middle(place)), seen.spot.score
         yield Notify(
             told if score is None else tr("{seen}; score {score:g}", seen=told, score=score)

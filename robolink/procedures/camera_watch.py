@@ -151,6 +151,40 @@ class SpotWatch:
             return movement.judged(self._rows(after), play_mm=0.0) is MovementVerdict.NONE
         return movement.seen_length < self._least_px(movement)
 
+    def nearly_follows(self, before: SeenAt, after: SeenAt) -> bool:
+        """Return whether a spot moved as the robot did but for what play of the joints explains."""
+        if not self.in_mm(after):
+            return False
+        movement = self.movement(before, after)
+        off_mm = math.dist(movement.seen, movement.known_mm)
+        return off_mm <= FOLLOWS_WITHIN * movement.known_length_mm + 3 * movement.noise
+
+    def moved_at_rest(self, look: SeenAt, now: SeenAt, known_mm: float) -> bool:
+        """Return whether a spot moved between two looks of a robot that stood still.
+
+        Args:
+            look: The first look.
+            now: The second.
+            known_mm: The movement before the first look; a third of it counts.
+        """
+        moved = self.movement(look, now)
+        if self.in_mm(now):
+            least = LEAST_SHARE * known_mm
+        else:
+            least = LEAST_SHARE * known_mm / self.longest_mm_per_px
+        return moved.seen_length >= max(least, _BEYOND_NOISE * moved.noise)
+
+    def came_late(self, mark: int, before: SeenAt, look: SeenAt, now: SeenAt) -> bool:
+        """Return whether a spot stood still while the robot moved, and moved likewise later.
+
+        Args:
+            mark: What was looked at.
+            before: The look before the robot moved.
+            look: The look after that.
+            now: A later one at the same place.
+        """
+        return self.stands_still(mark, before, look) and self.follows(mark, before, now)
+
     def alike(self, one: tuple[SeenAt, SeenAt], other: tuple[SeenAt, SeenAt]) -> bool:
         """Return whether two movements in one direction were seen in the same way."""
         return self.movement(*one).like(self.movement(*other), within=FOLLOWS_WITHIN)

@@ -11,6 +11,7 @@ from robolink.model import (
     AnsweredBy,
     Controller,
     ControllerSensor,
+    KeepsPictures,
     MotionGroup,
     Pose,
     TipSensor,
@@ -225,6 +226,8 @@ class MeasurementContext:
         group = self.controller.groups[0]
         if camera is not None and isinstance(camera, ControllerSensor):
             camera = camera.beside(self.controller)
+        if camera is not None and isinstance(camera, KeepsPictures):
+            camera.of_change(self.controller.outcomes.change)
         # If nothing moves, there is nothing to limit, and perhaps no pose to read.
         start = Pose(0.0, 0.0, 0.0, 0.0) if self.start is None else self.start
         return Runner(

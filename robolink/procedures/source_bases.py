@@ -12,7 +12,7 @@ from robolink.calibration import CalibrationResult, VerifyResult, tip_pose, towa
 from robolink.deprecation import deprecated, old_hook
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, SpotUnit, TipSensor, ToolOffset
+from robolink.model import NamesDoubts, Pose, SpotUnit, StationSensor, TipSensor, ToolOffset
 from robolink.procedures.kept_proof import KeepsProof, KeptProof, ProofBasis, ProvesAgain
 from robolink.procedures.pin_proof import TurnTest, contact_pose, drift_uncertainty_mm
 from robolink.procedures.source import MeasurementContext, MovingSource, touching_further
@@ -411,22 +411,30 @@ def calibrated_camera(sensor: str | TipSensor, station: CameraStation) -> Iterat
     """Open a camera whose pixels are calibrated, or that answers in millimetres.
 
     Raises:
-        CalibrationError: ``sensor_not_found`` or ``camera_not_calibrated``.
+        CalibrationError: ``sensor_not_found`` or ``camera_not_calibrated``; and as
+            :meth:`robolink.model.StationSensor.at_station`.
         ConfigError, ConnectError: As :func:`robolink.sensing.open_sensor`.
     """
     with open_sensor(sensor) as camera:
         if camera.unit is SpotUnit.PIXEL:
             station.require_model()
-        yield camera
+        yield _at_station(camera, station)
 
 
 @contextmanager
-def pixel_camera(sensor: str | TipSensor) -> Iterator[TipSensor]:
+def pixel_camera(
+    sensor: str | TipSensor, station: CameraStation | None = None
+) -> Iterator[TipSensor]:
     """Open a camera that answers in pixels.
+
+    Args:
+        sensor: URL or name of the camera, or the camera.
+        station: Where it stands; ``None`` where nothing is stated of it.
 
     Raises:
         ConfigError: It answers in millimetres; and as :func:`robolink.sensing.open_sensor`.
-        CalibrationError: ``sensor_not_found``.
+        CalibrationError: ``sensor_not_found``; and as
+            :meth:`robolink.model.StationSensor.at_station`.
         ConnectError: It is not there.
     """
     with open_sensor(sensor) as camera:
@@ -435,7 +443,13 @@ def pixel_camera(sensor: str | TipSensor) -> Iterator[TipSensor]:
                 tr("{camera} answers in millimetres already.", camera=camera.identity),
                 remedy=tr("Use it as a calibrated camera: robolink calibrate camera."),
             )
-        yield camera
+        yield camera if station is None else _at_station(camera, station)
+
+
+def _at_station(camera: TipSensor, station: CameraStation) -> TipSensor:
+    if isinstance(camera, StationSensor):
+        return camera.at_station(station.details, station.mm_per_px)
+    return camera
 
 
 @dataclass(frozen=True, slots=True)
@@ -467,7 +481,9 @@ class LookSource(ProvesAgain):
     ) -> CalibrationResult:
         """Look and solve; see :class:`~robolink.procedures.MovingSource`."""
         with self.opened() as camera:
-            return context.measure(lambda here: self.procedure(stored, here), camera=camera)
+            result = context.measure(lambda here: self.procedure(stored, here), camera=camera)
+            doubts = camera.doubts() if isinstance(camera, NamesDoubts) else ()
+        return replace(result, warnings=(*result.warnings, *doubts)) if doubts else result
 
     @abstractmethod
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:

@@ -87,6 +87,7 @@ TOUCH_CODES: Final = (
     "tip_did_not_move",
     "camera_changed",
     "spot_changed",
+    "stale_picture",
 )
 """Reasons why touches or looks do not count, in a measurement and in a turn test."""
 

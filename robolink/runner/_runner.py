@@ -22,6 +22,7 @@ from robolink.model import (
     Controller,
     ControllerState,
     ControllerStatus,
+    LooksAtRest,
     MotionGroup,
     MotionOutcome,
     MotionProfile,
@@ -65,7 +66,7 @@ from robolink.runner._steps import (
     TakenStep,
 )
 from robolink.runner._yes_no import Asking
-from robolink.sensing import median_spot, scatter_of, seen_in
+from robolink.sensing import PATIENT_S, median_spot, scatter_of, seen_at_place, seen_in
 
 
 def ended_by(status: ControllerStatus) -> str:
@@ -218,7 +219,7 @@ class Runner:
                     continue
                 if self._on_step is not None:
                     self._on_step(done)
-                step = procedure.send(_answer(done))
+                step = procedure.send(done.answer)
         except StopIteration as finished:
             result: T = finished.value
             self._require_going()
@@ -284,6 +285,8 @@ class Runner:
             if said:
                 self.robot_time.unusual()
             return StepDone(step, accepted=said is True, word=word)
+        if isinstance(step, Look) and step.repeated and not isinstance(self._camera, LooksAtRest):
+            return StepDone(step)
         return StepDone(step, self._moved(step))
 
     def _moved(self, step: Ask | Move | Seek | Look) -> Pose:
@@ -317,9 +320,14 @@ class Runner:
                     sensor=remedy_word(RemedyWord.SENSOR),
                 ),
             )
-        self._controller.clock.sleep(camera.settle_s)
+        sleep, settle_s = self._controller.clock.sleep, camera.settle_s
+        patient_s = max(settle_s, PATIENT_S)
+        sleep(patient_s if step.repeated else settle_s)
         pose = self._group.pose()
-        spots = seen_in(camera, step.mark, pictures=step.pictures)
+        if step.awaited:
+            spots = seen_at_place(camera, step.mark, step.pictures, lambda: sleep(patient_s))
+        else:
+            spots = seen_in(camera, step.mark, pictures=step.pictures)
         return SeenAt.of(pose, median_spot(spots), camera.unit, scatter=scatter_of(spots))
 
     def _seek(self, step: Seek) -> Pose:
@@ -478,13 +486,6 @@ class Runner:
                 remedy=tr("Remove the cause and start again. The robot will not move by itself."),
                 controller=self._controller.identity,
             )
-
-
-def _answer(done: StepDone) -> Pose | bool | str | None:
-    """Return the answer to a procedure's step: an offer that nobody heard is declined."""
-    if isinstance(done.step, Confirm):
-        return done.word or done.accepted is True
-    return done.pose
 
 
 def ask_for_pose(instruction: str, jog: JogRange | None = None) -> Procedure[Pose]:

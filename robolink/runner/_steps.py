@@ -205,6 +205,10 @@ class Look:
         mark: The tip, or the number of a fiducial.
         pictures: How many are taken; the median of them counts.
         in_pixels: Whether the answer is in pixels of which nobody knows yet how long they are.
+        awaited: Whether the mark has to be there: a camera that does not see it may be late.
+        repeated: Whether it is one more look without a movement, which only a camera takes that
+            works on pictures of its own (:class:`~robolink.model.LooksAtRest`); answered with
+            ``None`` for others.
     """
 
     purpose: str
@@ -212,6 +216,8 @@ class Look:
     mark: int = TIP
     pictures: int = 3
     in_pixels: bool = field(default=False, compare=False)
+    awaited: bool = field(default=False, compare=False)
+    repeated: bool = field(default=False, compare=False)
 
 
 def _as_it_is(pose: Pose) -> dict[str, Any]:
@@ -374,6 +380,13 @@ class StepDone:
     pose: Pose | None = None
     accepted: bool | None = None
     word: str = ""
+
+    @property
+    def answer(self) -> Pose | bool | str | None:
+        """What the procedure is sent; an offer that nobody heard is declined."""
+        if isinstance(self.step, Confirm):
+            return self.word or self.accepted is True
+        return self.pose
 
 
 Step = TakenStep | Consider

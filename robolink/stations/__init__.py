@@ -24,12 +24,16 @@ if TYPE_CHECKING:
     from robolink.stations._places import sensor_of as sensor_of
     from robolink.stations._places import touch_station as touch_station
     from robolink.stations._station import AGREEING_MM as AGREEING_MM
+    from robolink.stations._station import TAUGHT as TAUGHT
     from robolink.stations._station import Found as Found
     from robolink.stations._station import Gauge as Gauge
     from robolink.stations._station import Station as Station
     from robolink.stations._station import StationKind as StationKind
     from robolink.stations._station import station_entry as station_entry
     from robolink.stations._station import station_of as station_of
+    from robolink.stations._teaching import Taught as Taught
+    from robolink.stations._teaching import shape_stated as shape_stated
+    from robolink.stations._teaching import teaching_entry as teaching_entry
 else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
@@ -42,6 +46,9 @@ else:
                 "BeamStation CameraStation TouchStation beam_station camera_station "
                 "pin_of sensor_of touch_station"
             ),
-            "_station": "AGREEING_MM Found Gauge Station StationKind station_entry station_of",
+            "_station": (
+                "AGREEING_MM TAUGHT Found Gauge Station StationKind station_entry station_of"
+            ),
+            "_teaching": "Taught shape_stated teaching_entry",
         },
     )

@@ -9,7 +9,10 @@ from robolink.config import Cell
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RobolinkError
 from robolink.messages import joined, known_names, tr
 from robolink.model import Controller, EntryKind, Recorded, from_fields
+from robolink.sensing import sensor_name
+from robolink.stations._places import sensor_of
 from robolink.stations._station import Station, StationKind, apart_mm, station_of
+from robolink.stations._teaching import teachings, with_teaching
 
 _PLACE = (
     *("x_mm", "y_mm", "z_mm", "sigma_mm"),
@@ -30,7 +33,8 @@ def find_stations(cell: Cell | None, entries: Iterable[Recorded]) -> dict[str, S
     """
     stations = _declared(cell)
     learnt: dict[str, Station] = {}
-    for entry in entries:
+    recorded = list(entries)
+    for entry in recorded:
         station = station_of(entry)
         if station is not None:
             learnt.setdefault(station.id, station)
@@ -40,6 +44,11 @@ def find_stations(cell: Cell | None, entries: Iterable[Recorded]) -> dict[str, S
             stations[name] = newest
         elif declared.kind is newest.kind:
             stations[name] = _together(declared, newest)
+    for name, teaching in teachings(recorded).items():
+        # A camera that is neither declared nor calibrated any more has nothing to be used for.
+        if name in stations:
+            sensor = sensor_name(sensor_of(stations[name]))
+            stations[name] = with_teaching(stations[name], teaching, sensor)
     return stations
 
 

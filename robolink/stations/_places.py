@@ -1,8 +1,9 @@
 """From a station to the values that a procedure uses."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, cast
 
 from robolink.calibration import CameraModel, Sighting
 from robolink.errors import CalibrationError, ConfigError
@@ -69,12 +70,22 @@ class CameraStation:
         z_mm: Height in the base at which it is in focus.
         model: What its pixels mean, from ``calibrate camera-affine``; ``None`` where it is
             unknown, or where the camera answers in millimetres itself.
+        details: What else is stated and taught of it, plain JSON, ``station`` for its name; for a
+            camera that has to know it (:class:`~robolink.model.StationSensor`).
     """
+
+    json_version: ClassVar[int] = 2
 
     x_mm: float
     y_mm: float
     z_mm: float
     model: CameraModel | None = None
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
+
+    @property
+    def mm_per_px(self) -> float | None:
+        """Length of a pixel, the mean of both axes; ``None`` where it is unknown."""
+        return None if self.model is None else math.sqrt(abs(self.model.determinant))
 
     def base_mm(self, seen: SeenAt) -> tuple[float, float]:
         """Return where in the base something was seen.
@@ -202,7 +213,14 @@ def camera_station(station: Station) -> CameraStation:
             place_sigma_mm=float(place) if isinstance(place, (int, float)) else 0.0,
             scale_sigma=float(scale) if isinstance(scale, (int, float)) else 0.0,
         )
-    return CameraStation(*_place(station), model)
+    details = {key: value for key, value in station.details.items() if key not in _OF_THE_MODEL}
+    return CameraStation(*_place(station), model, {"station": station.id, **details})
+
+
+_OF_THE_MODEL = frozenset(
+    # And the camera's own address, which may hold a password: the details go on record.
+    {"mm_per_px", "origin_mm", "centre_mm", "place_sigma_mm", "scale_sigma", "sensor", "seen_by"}
+)
 
 
 def sensor_of(station: Station) -> str:

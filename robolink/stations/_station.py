@@ -247,6 +247,9 @@ def station_entry(found: Found, *, base: tuple[float, ...] | None = None) -> New
     )
 
 
+TAUGHT: Final = "taught"
+"""Key of the details of an entry that says what a camera was taught, and not where a station is."""
+
 _AXES: Final = 6
 
 _COMMON = frozenset(
@@ -255,8 +258,10 @@ _COMMON = frozenset(
 
 
 def station_of(entry: Recorded) -> Station | None:
-    """Return the station in an entry, ``None`` if it cannot be read."""
+    """Return the station in an entry, ``None`` if it cannot be read or tells no place of one."""
     details = entry.details
+    if TAUGHT in details:
+        return None
     name, kind = details.get("station"), details.get("kind")
     if not isinstance(name, str) or kind not in list(StationKind):
         return None

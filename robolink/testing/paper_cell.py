@@ -125,6 +125,8 @@ class PaperCell:
                 return None
             case Confirm():
                 return False
+            case Look(repeated=True):
+                return None
             case Look():
                 return self._seen(step)
             case Move():

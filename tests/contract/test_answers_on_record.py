@@ -60,6 +60,9 @@ class Person(_operator.AssistedOperator):
     answers_as = AnsweredBy.PERSON
     glance = staticmethod(lambda: None)
 
+    def look(self):
+        pass
+
     def regard(self, subject):
         """Draw nothing."""
 

@@ -237,6 +237,15 @@ def test_numbers_that_are_none_are_refused(plug_in):
         ("assist+tcp://s3cret@127.0.0.1:40001", "assist+tcp://127.0.0.1:40001"),
         ("rtsp://user:s3cret@cam.local:554/tip?x=1", "rtsp://cam.local:554/tip?x=1"),
         ("rtsp://cam.local/a@b", "rtsp://cam.local/a@b"),
+        ("http://me:pass/word@cam/snap", "http://cam/snap"),
+        ("http://[::1]:80/snap@2", "http://[::1]:80/snap@2"),
+        ("http://cam/snap?channel=2&size=640x480", "http://cam/snap?channel=2&size=640x480"),
+        (
+            "http://cam/snap?pwd=1234&loginuse=a&k=s3cret",
+            "http://cam/snap?pwd=...&loginuse=...&k=...",
+        ),
+        ("mjpeg+https://cam/live?s3cret", "mjpeg+https://cam/live?..."),
+        ("vision-guide?program=3", "vision-guide?program=3"),
     ],
 )
 def test_what_lets_one_in_at_a_camera_is_no_part_of_its_name(given, shown):

@@ -135,6 +135,10 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "camera_moved": lambda: tr(
         "The camera is off: it was moved, or its calibration is out of date."
     ),
+    "focus_not_taught": lambda: tr(
+        "The tip's edge is wide in the pictures and nobody taught the camera's focus: learn the "
+        "station."
+    ),
     "unequal_scale": lambda: tr("The camera's two axes differ greatly in scale."),
     "large_shear": lambda: tr("The image is askew: the camera seems to lean."),
     "large_pixel_residual": lambda: tr(

@@ -1,0 +1,1 @@
+"""What delivers pictures: a folder, a web address, a stream, a camera on USB."""

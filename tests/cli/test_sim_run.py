@@ -8,17 +8,18 @@ import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.simulate.cells_file import KINDS, DeclaredKeys, read_cells
 from robolink_cli.commands.simulate.demo import (
-    AcceptedChange,
     DemoOperator,
     DemoSettings,
     require_refused,
 )
 from robolink_cli.commands.simulate.demo import _on_plc as on_plc
+from robolink_cli.commands.simulate.demo_changes import AcceptedChange
 from robolink_cli.commands.simulate.sim import sim
 from robolink_cli.commands.simulate.sim_run import SCHEMA, _tell_end, made
 from robolink_simulators.control.client import ControlClient
@@ -372,6 +373,33 @@ def test_a_cell_of_a_file_is_made_when_it_is_first_used(file):
         assert vars(simulator)["machine"].model.name == document["robot"]
 
 
+@pytest.mark.parametrize("kind", ["epson", "softmotion"])
+def test_a_cell_with_a_camera_names_where_its_pictures_are(file, tmp_path, kind):
+    table = f'[cells.a]\nkind = "{kind}"\ntcp = "127.0.0.1:0"\ncamera = "127.0.0.1:0"\n'
+    (tmp_path / "pictures").mkdir()
+    (cell,) = read_cells(file(f'{HEAD}{table}camera_folder = "pictures"\n'), sim.commands)
+    (simulator,) = made([cell]).values()
+    with ExitStack() as stack:
+        served = cell.kind.serve(stack, simulator, cell.given, person=False)
+        camera = served.document("http://127.0.0.1:1")["camera"]
+        assert isinstance(camera, dict)
+        assert camera["size_px"] == [1280, 1024]
+        assert sorted(camera["urls"]) == ["jpg", "pgm", "png", "stream"]
+        with urlopen(camera["url"], timeout=30) as answer:
+            assert answer.read(2) == b"P5"
+        assert served.requests == 1
+        end_s = time.monotonic() + 30
+        while not list((tmp_path / "pictures").glob("*.png")):
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+
+
+def test_a_camera_at_no_address_is_refused_by_its_option(file):
+    table = '[cells.a]\nkind = "epson"\ncamera = "everywhere"\n'
+    with pytest.raises(ConfigError, match="camera"):
+        read_cells(file(f"{HEAD}{table}"), sim.commands)
+
+
 # ``robolink demo --operator``: a careful person gets a new tool, a careless one a refusal.
 
 STORED = {"x_mm": 12.0, "y_mm": -3.5, "z_mm": -20.0}
@@ -410,6 +438,22 @@ def test_at_a_pace_of_real_time_no_simulated_seconds_are_told(capsys):
     scara, plc = json.loads(capsys.readouterr().out)["controllers"]
     assert scara["simulated_s"] is None
     assert plc["simulated_s"] > plc["exchanges"] * 0.005
+
+
+@pytest.mark.soak
+def test_an_eye_changes_both_nozzles(capsys):
+    assert main.run(["demo", "--json", "--eye", "--speed", "0", "--seed", "2"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["eye"] is True
+    for one in document["controllers"]:
+        assert one["error_mm"] < 0.01 < 0.2 < one["error_before_mm"]
+        assert one["pictures"] > 40
+        assert not wrong_in(document)
+
+
+def test_an_eye_has_no_careless_person(capsys):
+    assert main.run(["demo", "--eye", "--operator", "careless"]) == 2
+    assert "leave --operator out" in capsys.readouterr().err
 
 
 def test_a_pace_slower_than_real_time_is_refused(capsys):

@@ -73,7 +73,12 @@ DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
 SECTIONS: Final[tuple[HelpSection, ...]] = (
     (
         declared("Where it is served"),
-        frozenset({"--tcp", "--serial", "--baud", "--can", "--unit", "--node", "--allow-remote"}),
+        frozenset(
+            {
+                *("--tcp", "--serial", "--baud", "--can", "--unit", "--node", "--allow-remote"),
+                *("--camera", "--camera-folder", "--camera-gige"),
+            }
+        ),
     ),
     (
         declared("What is simulated"),
@@ -176,6 +181,30 @@ class SimulationOptions(NamedTuple):
             "lists all. May be repeated.",
         ),
     ] = ()
+    camera: Annotated[
+        str | None,
+        CliOption(
+            metavar="HOST:PORT",
+            help="Serve drawn pictures of the up-looking camera by HTTP there; port 0 takes a "
+            "free one.",
+        ),
+    ] = None
+    camera_folder: Annotated[
+        Path | None,
+        click.Path(exists=True, file_okay=False, path_type=Path),
+        CliOption(
+            metavar="DIR",
+            help="Write a drawn picture into this folder every half second, the last 20 of them.",
+        ),
+    ] = None
+    camera_gige: Annotated[
+        str | None,
+        CliOption(
+            metavar="ADDRESS",
+            help="Serve drawn pictures as a GigE Vision camera on this address, such as "
+            "127.0.0.1; needs the library Aravis.",
+        ),
+    ] = None
 
 
 class ServedLife(NamedTuple):

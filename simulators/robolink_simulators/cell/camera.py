@@ -17,7 +17,7 @@ from robolink.model import ToolOffset, rotate_xy
 from robolink_simulators.cell.frames import Frame, printed_angles, zyx
 from robolink_simulators.cell.places import Pixel, XyzMm
 
-_LENS_MM: Final = 120.0
+LENS_MM: Final = 120.0
 """Distance from the lens to the plane of focus, in mm (assumed)."""
 
 _DEPTH_MM: Final = 2.0
@@ -82,6 +82,15 @@ class CameraOptics:
         """
         if abs(dz) > _DEPTH_MM:
             return None
+        px, py = self.image_of(dx, dy, dz)
+        width, height = self.size_px
+        return (px, py) if 0 <= px <= width and 0 <= py <= height else None
+
+    def image_of(self, dx: float, dy: float, dz: float) -> Pixel:
+        """Return the same wherever it is, in focus and in the picture or not.
+
+        (0, 0) is the corner of the first pixel; its middle is (0.5, 0.5).
+        """
         toward = math.radians(self.tilt_toward_deg)
         along_x, along_y = math.cos(toward), math.sin(toward)
         lean = math.radians(self.tilt_deg)
@@ -91,14 +100,13 @@ class CameraOptics:
             out * math.cos(lean) - dz * math.sin(lean),
             out * math.sin(lean) + dz * math.cos(lean),
         )
-        shrunk = _LENS_MM / (_LENS_MM + up)
+        shrunk = LENS_MM / (LENS_MM + up)
         out, across = out * shrunk, across * shrunk
         x, y = out * along_x - across * along_y, out * along_y + across * along_x
         (a, b), (c, d) = self.mm_per_px
         area = a * d - b * c
         width, height = self.size_px
-        px, py = (d * x - b * y) / area + width / 2, (a * y - c * x) / area + height / 2
-        return (px, py) if 0 <= px <= width and 0 <= py <= height else None
+        return (d * x - b * y) / area + width / 2, (a * y - c * x) / area + height / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,12 +206,14 @@ class CameraTruth:
         middle_mm: Point of the base that the middle of the image looks at, in focus.
         optics: What it does to a place.
         rng: Source of its errors.
+        moved_mm: How far it has been moved from there since, X and Y of the base.
         finder: What looks for marks in its pictures.
     """
 
     middle_mm: XyzMm
     optics: CameraOptics
     rng: random.Random
+    moved_mm: tuple[float, float] = (0.0, 0.0)
     finder: Finder = field(init=False)
 
     def __post_init__(self) -> None:
@@ -225,11 +235,16 @@ class CameraTruth:
         missed = rng.random() < optics.miss_share
         found = list[Pixel | None]()
         for place in places:
-            pixel = optics.pixel(*(a - b for a, b in zip(place, self.middle_mm, strict=True)))
+            pixel = optics.pixel(*self.beside(place))
             found.append(None if pixel is None or missed else self._found(pixel))
         return self.finder.answers(
             found, size_px=optics.size_px, noise_px=optics.noise_px, exposes=exposes
         )
+
+    def beside(self, place: XyzMm) -> XyzMm:
+        """Return where a place is, seen from the point that the camera looks at now, mm."""
+        (x, y, z), (dx, dy) = self.middle_mm, self.moved_mm
+        return place[0] - x - dx, place[1] - y - dy, place[2] - z
 
     def _found(self, pixel: Pixel) -> Pixel:
         optics, rng = self.optics, self.rng

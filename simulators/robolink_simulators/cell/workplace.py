@@ -23,6 +23,7 @@ from robolink_simulators.cell.surfaces import (
     SurfaceContact,
     resistance_n,
 )
+from robolink_simulators.cell.tip_looks import TipLook, look_drawn
 from robolink_simulators.cell.tip_switches import (
     STANDING,
     UPRIGHT,
@@ -86,6 +87,7 @@ class Workplace(ABC):
         leans: By how much the nozzle of a tool is bent; upright where none is named.
         camera: The up-looking camera.
         board: The board that the mounted nozzle holds, ``None`` for none.
+        set_ups: How often parameters were given; pictures count from the last time.
     """
 
     inputs: ClassVar[int]
@@ -105,6 +107,7 @@ class Workplace(ABC):
         self.pin_mm = pin_mm
         self.leans: dict[int, Lean] = {}
         self.board: SimulatedBoard | None = None
+        self.set_ups = 0
         self._seed = seed
         self._random = late_random(f"nozzles {seed}")
         self._replaced = replaced
@@ -130,6 +133,8 @@ class Workplace(ABC):
         self.operator_sigma_mm = parameters.eye_sigma_mm
         self.leans[MOUNTED_TOOL] = parameters.lean
         self.camera.optics = parameters.optics
+        self.camera.moved_mm = parameters.camera_moved
+        self.set_ups += 1
         self.camera.finder.set_up(parameters.finder_faults)
         self.robot.loosen(parameters)
         if not parameters.board_held:
@@ -248,11 +253,26 @@ class Workplace(ABC):
         if mark == TIP:
             # A board held by the nozzle hides its tip.
             shown = [tool for tool in self.tips if not (board and tool == MOUNTED_TOOL)]
-            return [(self._seen_tip_mm(tool), self.axis("x", tool)) for tool in shown]
-        seen = board.fiducials(nozzle) if board else ()
-        return [(self.robot.tip_mm(p), self.robot.turned(axis_of(p, "x"))) for p in seen]
+            seen = [(self.seen_tip_mm(tool), self.axis("x", tool)) for tool in shown]
+            second_mm = self.second_tip_mm()
+            return seen if second_mm is None else [*seen, (second_mm, self.axis("x"))]
+        held = board.fiducials(nozzle) if board else ()
+        return [(self.robot.tip_mm(p), self.robot.turned(axis_of(p, "x"))) for p in held]
 
-    def _seen_tip_mm(self, tool: int) -> XyzMm:
+    def second_tip_mm(self) -> XyzMm | None:
+        """Return where another nozzle beside the mounted one is; ``None`` where there is none."""
+        beside_mm = self.parameters.second_tip_mm
+        if beside_mm is None or self.board is not None:
+            return None
+        return add(self.tip_mm(), self.robot.turned((*beside_mm, 0.0)))
+
+    def look_of(self, tool: int = MOUNTED_TOOL) -> TipLook:
+        """Return how the end of a tool looks from below; another nozzle looks otherwise."""
+        tip = self.tips.get(tool, ToolOffset())
+        place = " ".join(f"{at:.4f}" for at in tip.components()[:3])
+        return look_drawn(self.parameters.tip_build, f"{self._seed} {tool} {place}")
+
+    def seen_tip_mm(self, tool: int) -> XyzMm:
         """Return where a camera sees a physical tip: off by a vector that is fixed in the tool."""
         x_mm, y_mm = self.parameters.tip_seen_beside_mm
         if not x_mm and not y_mm:
@@ -293,6 +313,7 @@ class Workplace(ABC):
                 "mm_per_px": [list(row) for row in self.camera.optics.mm_per_px],
                 "size_px": list(self.camera.optics.size_px),
             },
+            "looks": {str(tool): asdict(self.look_of(tool).told()) for tool in self.tips},
             "board": self._held(),
             "parameters": asdict(self.parameters),
         }

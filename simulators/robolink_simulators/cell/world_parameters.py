@@ -13,9 +13,24 @@ from robolink.errors import ConfigError
 from robolink.messages import known_names, tr
 from robolink_simulators.cell.camera import CameraOptics, FinderFaults
 from robolink_simulators.cell.habits import BiasFrame, PersonHabits, PinBump
+from robolink_simulators.cell.picture_settings import (
+    FleckShape,
+    MarkShape,
+    PictureFaults,
+    PictureLook,
+    Stuck,
+)
 from robolink_simulators.cell.surfaces import Touched
+from robolink_simulators.cell.tip_looks import TipBuild, TipKind
 from robolink_simulators.cell.tip_switches import Lean
 from robolink_simulators.option_values import values_from_text
+
+LIMITS: Final[Mapping[str, tuple[float, float]]] = {
+    "tip_diameter_mm": (0.01, 100),
+    "tip_dirt": (0, 20),
+    "picture_clutter": (0, 50),
+}
+"""Lowest and highest value of parameters that cannot be drawn otherwise."""
 
 PREFIX: Final = "world."
 """Prefix of the world parameters in a sim URL."""
@@ -58,7 +73,24 @@ class WorldParameters:
         camera_tip_beside_px, camera_tip_beside_toward_deg: How far beside where it is the camera
             sees a tip, and in which direction, counted from the flange's X: a rough edge, a bevel.
             It turns with the tool.
+        camera_moved_mm, camera_moved_toward_deg: How far, and in which direction of the base, the
+            camera has been moved from where it was mounted.
+        tip_kind, tip_diameter_mm, tip_bore_mm, tip_bore_aside_mm, tip_dirt, tip_dark: How tips
+            look in drawn pictures: what is at the end, how wide face and bore are, how far the
+            bore is off its middle, how many specks are on it, whether it is black.
+        second_tip_beside_mm, second_tip_toward_deg: How far beside the mounted nozzle there is
+            another one, and in which direction, counted from the flange's X; 0 for none.
+        picture_blur_px, picture_aperture_mm, picture_noise_grey, picture_clutter, picture_glare:
+            What all drawn pictures are like; see :class:`PictureLook`.
+        picture_exposure, picture_defocus_mm, picture_stuck, picture_late, picture_late_s,
+            picture_fleck, picture_fleck_radius_px, picture_fleck_beside_px,
+            picture_fleck_toward_deg, picture_tip_hidden, picture_halved, picture_gone,
+            picture_slow_s: What is wrong with some; see :class:`PictureFaults`.
+        picture_faults_from, picture_faults_count: From which picture on, counted from when the
+            world was set up, and with how many; 0 for all that follow.
         board_held: Whether the nozzle holds a board, which hides its tip.
+        board_mark, board_mark_mm: What its fiducials look like in drawn pictures, and how wide
+            they are.
         person_stays_share, person_stays_from_touch: Share of the touches for which the person
             only presses ENTER, and the first one to which it applies.
         person_bias_mm, person_bias_frame, person_bias_toward_deg: How far, and toward what, the
@@ -116,7 +148,39 @@ class WorldParameters:
     camera_spot_swells_from_picture: int = 1
     camera_tip_beside_px: float = 0.0
     camera_tip_beside_toward_deg: float = 0.0
+    camera_moved_mm: float = 0.0
+    camera_moved_toward_deg: float = 0.0
+    tip_kind: TipKind = "clean"
+    tip_diameter_mm: float = 1.0
+    tip_bore_mm: float = 0.5
+    tip_bore_aside_mm: float = 0.0
+    tip_dirt: int = 0
+    tip_dark: bool = False
+    second_tip_beside_mm: float = 0.0
+    second_tip_toward_deg: float = 0.0
+    picture_blur_px: float = 0.7
+    picture_aperture_mm: float = 20.0
+    picture_noise_grey: float = 2.0
+    picture_clutter: int = 3
+    picture_glare: float = 0.2
+    picture_exposure: float = 1.0
+    picture_defocus_mm: float = 0.0
+    picture_stuck: Stuck = "no"
+    picture_late: int = 0
+    picture_late_s: float = 0.0
+    picture_fleck: FleckShape = "none"
+    picture_fleck_radius_px: float = 25.0
+    picture_fleck_beside_px: float = 0.0
+    picture_fleck_toward_deg: float = 0.0
+    picture_tip_hidden: bool = False
+    picture_halved: bool = False
+    picture_gone: bool = False
+    picture_slow_s: float = 0.0
+    picture_faults_from: int = 1
+    picture_faults_count: int = 0
     board_held: bool = False
+    board_mark: MarkShape = "round"
+    board_mark_mm: float = 1.0
     person_stays_share: float = 0.0
     person_stays_from_touch: int = 1
     person_bias_mm: float = 0.0
@@ -153,6 +217,43 @@ class WorldParameters:
     def tool_turn(self) -> tuple[float, float, float]:
         """U, V and W of the mounted tool."""
         return self.tool_u_deg, self.tool_v_deg, self.tool_w_deg
+
+    @property
+    def camera_moved(self) -> tuple[float, float]:
+        """How far the camera has been moved, X and Y of the base, mm."""
+        toward = math.radians(self.camera_moved_toward_deg)
+        return self.camera_moved_mm * math.cos(toward), self.camera_moved_mm * math.sin(toward)
+
+    @property
+    def second_tip_mm(self) -> tuple[float, float] | None:
+        """Where another nozzle is beside the mounted one, X and Y of the flange; ``None``: none."""
+        if not self.second_tip_beside_mm:
+            return None
+        toward, beside_mm = math.radians(self.second_tip_toward_deg), self.second_tip_beside_mm
+        return beside_mm * math.cos(toward), beside_mm * math.sin(toward)
+
+    @property
+    def tip_build(self) -> TipBuild:
+        """How tips look."""
+        return TipBuild(**{it.name: getattr(self, f"tip_{it.name}") for it in fields(TipBuild)})
+
+    @property
+    def picture_look(self) -> PictureLook:
+        """What all drawn pictures are like."""
+        names = [field.name for field in fields(PictureLook)]
+        return PictureLook(**{name: getattr(self, f"picture_{name}") for name in names})
+
+    @property
+    def picture_faults(self) -> PictureFaults:
+        """What is wrong with some of the drawn pictures."""
+        names = [
+            it.name for it in fields(PictureFaults) if it.name not in ("from_picture", "count")
+        ]
+        return PictureFaults(
+            from_picture=self.picture_faults_from,
+            count=self.picture_faults_count,
+            **{name: getattr(self, f"picture_{name}") for name in names},
+        )
 
     @property
     def optics(self) -> CameraOptics:
@@ -217,6 +318,13 @@ def parameters_from_text(pairs: Mapping[str, str]) -> dict[str, object]:
         if values.get(name, 0.0) > 1:
             raise ConfigError(
                 tr("A share cannot be above 1."), remedy=tr("Give {name} from 0 to 1.", name=name)
+            )
+    for name, (least, most) in LIMITS.items():
+        if name in pairs and not least <= values[name] <= most:
+            allowed = tr("a number from {least:g} to {most:g}", least=least, most=most)
+            raise ConfigError(
+                tr("The option {name} cannot be {value!r}.", name=name, value=pairs[name]),
+                remedy=tr("It takes: {allowed}.", allowed=allowed),
             )
     return values
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Literal
 from robolink.model import ToolOffset
 from robolink_simulators.cell.places import XyzMm
 from robolink_simulators.cell.surfaces import FlatPlate, RoundBall
+from robolink_simulators.cell.tip_looks import ToldLook
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.wire_record import StartedMotion, WireLine
 from robolink_simulators.faults.fieldbus import Order
@@ -96,6 +97,7 @@ class CellTruth:
         surface: What the person touches in the pin's place, if anything.
         operator_sigma_mm: Standard deviation of what the person's eye reads, per axis.
         camera: The up-looking camera.
+        looks: How the tips look in drawn pictures, by number of the tool.
         board: The board that the mounted nozzle holds, if it holds one.
         parameters: What goes wrong in this cell.
     """
@@ -108,6 +110,7 @@ class CellTruth:
     surface: FlatPlate | RoundBall | None
     operator_sigma_mm: float
     camera: CameraSeen
+    looks: Mapping[str, ToldLook]
     board: BoardSeen | None
     parameters: WorldParameters
 

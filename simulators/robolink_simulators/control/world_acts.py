@@ -1,8 +1,8 @@
 """Acts on the world around any robot: see it, equip it, disturb it, touch it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
-from typing import Final, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -10,6 +10,7 @@ from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import (
+    LIMITS,
     WorldParameters,
     parameter_names,
     parameters_from_text,
@@ -27,6 +28,7 @@ from robolink_simulators.control.declared_acts import (
     WHOLE_TOOL,
     Answer,
     ControlAct,
+    Form,
     Given,
     Taken,
     shown_flange,
@@ -41,8 +43,16 @@ _LIMITS: Final = {
     "camera_um_per_px_y": (1e-6, MOST_OF_AN_OPTION),
     "person_stays_share": (0, 1),
     "camera_still_share": (0, 1),
+    **LIMITS,
 }
 """Lowest and highest value of the world parameters for which not every number from 0 is allowed."""
+
+_FORMS: Final[Mapping[Any, tuple[Form, bool]]] = {
+    float: ("number", False),
+    int: ("whole", False),
+    int | None: ("whole", True),
+}
+"""The form of a parameter by its type, and whether null is one."""
 
 _SCATTER: Final = Taken("noise_mm", needed=False, least=0)
 
@@ -151,11 +161,10 @@ def _parameters() -> Iterator[Taken]:
             yield Taken(name, "text", needed=False, choices=choices)
         elif hints[name] is bool:
             yield Taken(name, "flag", needed=False)
-        elif hints[name] is float:
-            least, most = _LIMITS.get(name, (0, MOST_OF_AN_OPTION))
-            yield Taken(name, needed=False, least=least, most=most)
         else:
-            yield Taken(name, "whole", needed=False, or_none=hints[name] is not int)
+            least, most = _LIMITS.get(name, (0, MOST_OF_AN_OPTION))
+            form, or_none = _FORMS[hints[name]]
+            yield Taken(name, form, needed=False, least=least, most=most, or_none=or_none)
 
 
 _PLACE: Final = tuple(Taken(name) for name in ("x_mm", "y_mm", "z_mm"))

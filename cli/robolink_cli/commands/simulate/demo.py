@@ -1,7 +1,5 @@
 """demo: a whole nozzle change on each kind of simulated controller."""
 
-import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -28,16 +26,22 @@ from robolink.calibration_run import (
 from robolink.errors import CalibrationError, VerifyError
 from robolink.journal import memory_journal
 from robolink.messages import tr
-from robolink.model import Controller, ToolOffset, json_fields, json_value
+from robolink.model import Controller
 from robolink.timing import NS_PER_S
 from robolink.transport import parse_url
+from robolink_cli.commands.simulate.demo_changes import (
+    TOOL,
+    AcceptedChange,
+    DemonstratedChange,
+    RefusedChange,
+)
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import AnswerTime
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_cli.views.fit import report_payload, show_proposal, show_report
+from robolink_cli.views.fit import show_proposal
 
 
 @click.command()
@@ -64,6 +68,13 @@ def demo(
             "must refuse that."
         ),
     ] = "careful",
+    eye: Annotated[
+        bool,
+        CliOption(
+            help="Measure with robolink's own eye: tips are found in drawn pictures of an "
+            "up-looking camera, which come over HTTP. Nobody touches anything."
+        ),
+    ] = False,
 ) -> None:
     """Change the nozzle of a simulated EPSON SCARA, then of a simulated SoftMotion PLC.
 
@@ -72,154 +83,10 @@ def demo(
     """
     if 0 < speed < 1:
         raise click.UsageError(tr("--speed is 0, or from 1 to 100."))
-    demonstrate(
-        DemoSettings(seed=seed, speed=speed, operator=DemoOperator(operator), answer_ms=answer_ms)
-    )
-
-
-TOOL = 1
-"""Number of the tool whose nozzle is changed."""
-
-
-@dataclass(frozen=True, slots=True)
-class DemonstratedChange(ABC):
-    """A nozzle change on one simulated controller.
-
-    Attributes:
-        kind: Kind of controller.
-        robot: What moves.
-        truth: Where the tip really is.
-        exchanges: Requests that it took, with those of connecting.
-        traffic_bytes: The bytes of these requests and their answers.
-        simulated_s: How many seconds of simulated time passed meanwhile: movements, answers and
-            what the simulated person needed. ``None`` where simulated time runs along with real
-            time: that would measure this computer.
-    """
-
-    kind: str
-    robot: str
-    truth: ToolOffset
-    exchanges: int
-    traffic_bytes: int | None
-    simulated_s: float | None
-
-    def payload(self) -> dict[str, object]:
-        """Return it as plain JSON."""
-        named = json_fields(
-            self, "kind", "robot", "truth", "exchanges", "traffic_bytes", "simulated_s"
-        )
-        return {**named, **self.end()}
-
-    @abstractmethod
-    def end(self) -> dict[str, object]:
-        """Return how it ended, as plain JSON."""
-
-    @abstractmethod
-    def show(self) -> None:
-        """Show how it ended."""
-
-    def show_duration(self) -> None:
-        """Show how much simulated time passed, where that says something of the robot."""
-        if self.simulated_s is not None:
-            say(
-                tr(
-                    "It took {seconds:.1f} s of simulated time, the simulated person's included.",
-                    seconds=self.simulated_s,
-                )
-            )
-
-
-@dataclass(frozen=True, slots=True)
-class AcceptedChange(DemonstratedChange):
-    """A nozzle change that was written and tested.
-
-    Attributes:
-        report: What was measured, written and verified.
-    """
-
-    report: ToolReport
-
-    @property
-    def error_mm(self) -> float:
-        """How far from the truth the tip was found, in the plane."""
-        found, true = self.report.proposal.offset, self.truth
-        return math.dist(found.components()[:2], true.components()[:2])
-
-    @property
-    def drift_mm(self) -> float:
-        """The largest drift about the new tip."""
-        if self.report.verification is None:
-            raise VerifyError(
-                tr("The demonstration did not pass its test."),
-                remedy=tr("Run it again with another --seed."),
-            )
-        return self.report.verification.max_drift_mm
-
-    def end(self) -> dict[str, object]:
-        """Return how it ended, as plain JSON."""
-        return {
-            "refused": None,
-            "recovered": json_value(self.report.proposal.offset),
-            "error_mm": self.error_mm,
-            "drift_mm": self.drift_mm,
-            **report_payload(self.report),
-        }
-
-    def show(self) -> None:
-        """Show how it ended, and how far off it was."""
-        say()
-        show_report(self.report)
-        say(
-            tr(
-                "The true tip is at X {x:.3f} Y {y:.3f}; the result is {error:.3f} mm off, after "
-                "{exchanges} exchanges. Checked against the simulator, not a robot.",
-                x=self.truth.x_mm,
-                y=self.truth.y_mm,
-                error=self.error_mm,
-                exchanges=self.exchanges,
-            )
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class RefusedChange(DemonstratedChange):
-    """A nozzle change that the procedures did not believe.
-
-    Attributes:
-        error: Why not.
-        in_force: What the controller holds after it; it held the same before.
-    """
-
-    error: CalibrationError | VerifyError
-    in_force: ToolOffset
-
-    def end(self) -> dict[str, object]:
-        """Return how it ended, as plain JSON."""
-        error = self.error
-        code = error.code if isinstance(error, CalibrationError) else "large_drift"
-        return {
-            "refused": {"code": code, "what": error.what, "remedy": error.remedy},
-            "in_force": json_value(self.in_force),
-        }
-
-    def show(self) -> None:
-        """Show what was refused, and which tool is selected."""
-        say()
-        say(tr("Refused: {what}", what=self.error.what))
-        if self.error.remedy:
-            say(f"  {self.error.remedy}")
-        say(
-            tr(
-                "Tool {tool} still holds X {x:.3f} Y {y:.3f} Z {z:.3f}, as before; the true tip is "
-                "at X {true_x:.3f} Y {true_y:.3f}. Checked against the simulator, not a robot.",
-                tool=TOOL,
-                x=self.in_force.x_mm,
-                y=self.in_force.y_mm,
-                z=self.in_force.z_mm,
-                true_x=self.truth.x_mm,
-                true_y=self.truth.y_mm,
-            )
-        )
+    person = DemoOperator(operator)
+    if eye and person is DemoOperator.CARELESS:
+        raise click.UsageError(tr("With --eye nobody touches anything: leave --operator out."))
+    demonstrate(DemoSettings(seed=seed, speed=speed, operator=person, answer_ms=answer_ms, eye=eye))
 
 
 _ROBOT = "T6-602S"
@@ -274,12 +141,14 @@ class DemoSettings:
         speed: How many times faster than real time the SCARA runs; 0 for simulated time alone.
         operator: Who touches the pin.
         answer_ms: How long after a request its answer leaves, in simulated milliseconds.
+        eye: Whether tips are found in drawn pictures.
     """
 
     seed: int
     speed: float
     operator: DemoOperator
     answer_ms: float
+    eye: bool = False
 
     @property
     def stays_share(self) -> float:
@@ -314,6 +183,7 @@ def demonstrate(given: DemoSettings) -> None:
             "simulated": True,
             "operator": given.operator.value,
             "answer_ms": given.answer_ms,
+            "eye": given.eye,
             "controllers": [one.payload() for one in both],
         }
         emit_json("robolink/demo/2", document)
@@ -359,7 +229,7 @@ def _over_tcp(given: DemoSettings, wire: WireLog) -> DemonstratedChange:
         _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url), given.operator)
         outcomes = memory_journal(host.url).log(host.url)
         with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
-            return _Cell("epson", _ROBOT, simulator, given.operator).change(controller)
+            return _Cell("epson", _ROBOT, simulator, given).change(controller)
 
 
 def _by_itself(given: DemoSettings, wire: WireLog) -> DemonstratedChange:
@@ -369,7 +239,7 @@ def _by_itself(given: DemoSettings, wire: WireLog) -> DemonstratedChange:
     name = parse_url(url).host
     try:
         with robolink.connect(url, trace=wire) as controller:
-            cell = _Cell("epson", _ROBOT, epson.simulator_named(name), given.operator)
+            cell = _Cell("epson", _ROBOT, epson.simulator_named(name), given)
             return cell.change(controller)
     finally:
         epson.unregister(name)
@@ -383,7 +253,7 @@ def _on_plc(given: DemoSettings) -> DemonstratedChange:
     try:
         with robolink.connect(url) as controller:
             simulator = softmotion.simulator_named(name)
-            cell = _Cell("softmotion", _KINEMATICS, simulator, given.operator)
+            cell = _Cell("softmotion", _KINEMATICS, simulator, given)
             done = cell.change(controller)
     finally:
         softmotion.unregister(name)
@@ -407,16 +277,16 @@ class _Cell:
     kind: str
     robot: str
     simulator: EpsonSimulator | SoftMotionSimulator
-    operator: DemoOperator
+    given: DemoSettings
 
     def change(self, controller: Controller) -> DemonstratedChange:
         """Change the nozzle, and return how it ended; a careless person may be refused."""
         before = controller.tools.read(TOOL)
         truth = self.simulator.world.tips[TOOL]
         try:
-            report = self._report(controller)
+            report, pictures = self._report(controller)
         except (CalibrationError, VerifyError) as error:
-            if self.operator is not DemoOperator.CARELESS:
+            if self.given.operator is not DemoOperator.CARELESS:
                 raise
             held = controller.tools.read(TOOL)
             if held is None or not controller.tools.same(held, before):
@@ -424,7 +294,9 @@ class _Cell:
             return RefusedChange(
                 self.kind, self.robot, truth, *self._spent(controller), error, in_force=held
             )
-        return AcceptedChange(self.kind, self.robot, truth, *self._spent(controller), report)
+        return AcceptedChange(
+            self.kind, self.robot, truth, *self._spent(controller), report, before, pictures
+        )
 
     def _spent(self, controller: Controller) -> tuple[int, int | None, float | None]:
         """Return the exchanges since the cell was connected to, their bytes, and seconds."""
@@ -433,15 +305,26 @@ class _Cell:
         simulated_s = clock.now_ns() / NS_PER_S if simulated else None
         return controller.exchanges, controller.traffic_bytes, simulated_s
 
-    def _report(self, controller: Controller) -> ToolReport:
+    def _report(self, controller: Controller) -> tuple[ToolReport, int | None]:
+        """Change the nozzle; returns with the report how many pictures were taken."""
         controller.motors(True)
+        if not self.given.eye:
+            return self._changed(controller, ToolPlan(TOOL)), None
+        from robolink_cli.commands.simulate.demo_eye import DemoEye
+
+        eye = DemoEye(self.simulator)
+        with eye.source() as source:
+            report = self._changed(controller, ToolPlan(TOOL, source))
+        return report, eye.pictures
+
+    def _changed(self, controller: Controller, tool: ToolPlan) -> ToolReport:
         person = AssistedOperator.with_eyes(
             InProcessEyes(self.simulator),
             lambda text: say(f"  {text}"),
             tool=lambda: TOOL,
             clock=controller.clock,
         )
-        plan = ChangePlan((ToolPlan(TOOL),), ask_before_write=False)
+        plan = ChangePlan((tool,), ask_before_write=False)
         change = NozzleChange(controller, plan, operator=person, listener=_Shown())
         (report,) = change.run().tools
         return report

@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+from robolink_simulators.control.client import ControlClient
 
 from robolink.errors import ConnectError
 from robolink.messages import tr
@@ -24,6 +26,7 @@ kind = "epson"
 tcp = "127.0.0.1:0"
 robot = "T6-602S"
 speed = 2
+camera = "127.0.0.1:0"
 
 [cells.tilting]
 kind = "softmotion"
@@ -37,7 +40,13 @@ tcp = "127.0.0.1:0"
 map = "dispenser.map.toml"
 """
 
-_RECIPES: Final = {"scara": "scara-pin", "tilting": "five-axes-pivot"}
+_RECIPES: Final = {
+    "scara": ("scara", "scara-pin"),
+    "scara-camera": ("scara", "pick-nozzle-camera"),
+    "tilting": ("tilting", "five-axes-pivot"),
+}
+"""By its name here: the cell that a recipe is for, and the shipped one that it is a copy of."""
+
 _MAP: Final = "commit-bit.toml"
 _END_S: Final = 10.0
 
@@ -85,11 +94,13 @@ def demo_cells() -> Iterator[DemoCells]:
             for name, about in cells.items():
                 rows += [f"[cells.{name}]", f"url = {json.dumps(about['url'])}"]
                 rows += [*_SETTINGS.get(name, ()), ""]
+                if "camera" in about:
+                    rows += [*_camera_rows(name, about), ""]
             cells_file = folder / "robolink.toml"
             cells_file.write_text("\n".join(rows), encoding="utf-8")
-            for name, recipe in _RECIPES.items():
+            for name, (cell, recipe) in _RECIPES.items():
                 text = (recipes_folder() / f"{recipe}.toml").read_text(encoding="utf-8")
-                ours = text.replace("\nbasis = ", f'\ncells = ["{name}"]\nbasis = ', 1)
+                ours = text.replace("\nbasis = ", f'\ncells = ["{cell}"]\nbasis = ', 1)
                 (folder / f"{name}.toml").write_text(ours, encoding="utf-8")
             assists = {name: one["assist"] for name, one in cells.items() if "assist" in one}
             yield DemoCells(folder, cells_file, folder / "state", assists, _pin(), pid)
@@ -114,8 +125,23 @@ _SETTINGS: Final = {
 """What the cell file says of each, beside its address."""
 
 
+def _camera_rows(cell: str, about: dict[str, Any]) -> list[str]:
+    """Return what the cell file says of a cell's camera: that of the recipe for it."""
+    with ControlClient(about["control"]) as control:
+        x_mm, y_mm, z_mm = control.do("truth")["camera"]["middle_mm"]
+    return [
+        f"[cells.{cell}.stations.CAM-01]",
+        'kind = "camera"',
+        f"sensor = {json.dumps(about['camera']['url'])}",
+        f"x_mm = {x_mm}",
+        f"y_mm = {y_mm}",
+        f"z_mm = {z_mm}",
+        "diameter_mm = 1.0",
+    ]
+
+
 @contextmanager
-def _served(simulated: Path) -> "Iterator[tuple[dict[str, dict[str, dict[str, str]]], int]]":
+def _served(simulated: Path) -> "Iterator[tuple[dict[str, dict[str, Any]], int]]":
     process = subprocess.Popen(
         [
             *(sys.executable, "-m", "robolink_cli", "--json", "sim", "run", str(simulated)),

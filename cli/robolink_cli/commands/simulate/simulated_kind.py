@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from robolink_simulators.cell.clock import EXCHANGE_S, SteeredClock
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
@@ -15,17 +15,60 @@ from robolink_simulators.plc import PlcSimulator
 
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
-from robolink_cli.commands.simulate.service import Termination, announce, controlled
+from robolink_cli.commands.simulate.service import (
+    Termination,
+    announce,
+    controlled,
+    host_and_port,
+)
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.simulation import ServedLife
 
 if TYPE_CHECKING:
     from robolink_simulators.control.assist import AssistHost
+    from robolink_simulators.pictures.gige_camera import GigeCamera
+    from robolink_simulators.pictures.server import PictureServer
 
 
 Options = Mapping[str, Any]
 """Values of a command's options by parameter name."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServedPictures:
+    """Where pictures of a cell's camera are served; nowhere where neither is.
+
+    Attributes:
+        server: Over HTTP.
+        gige: As a GigE camera.
+    """
+
+    server: "PictureServer | None" = None
+    gige: "GigeCamera | None" = None
+
+    @property
+    def requests(self) -> int:
+        """How many pictures were asked for."""
+        asked = 0 if self.server is None else self.server.requests
+        return asked if self.gige is None else asked + self.gige.frames
+
+    @property
+    def told(self) -> list[str]:
+        """One URL of each."""
+        by_http = [] if self.server is None else [self.server.url()]
+        return by_http if self.gige is None else [*by_http, self.gige.url]
+
+    def document(self) -> dict[str, object]:
+        """Return what a script is told, under ``camera``; nothing where there is nothing."""
+        if self.gige is None:
+            return {} if self.server is None else {"camera": self.server.document()}
+        gige = self.gige.document()
+        if self.server is None:
+            return {"camera": gige}
+        by_http = self.server.document()
+        urls = {**cast("dict[str, str]", by_http["urls"]), "gige": self.gige.url}
+        return {"camera": {**by_http, "urls": urls}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,23 +79,27 @@ class ServedCell:
         controlled: It, its time, and where clients connect to.
         assist: Where robolink asks the person beside it; ``None`` where nobody stands there.
         about: What else the first line says of it.
+        pictures: Where those of its camera are served.
     """
 
     controlled: ControlledCell
     assist: "AssistHost | None"
     about: Mapping[str, object]
+    pictures: "ServedPictures"
 
     @property
     def requests(self) -> int:
         """Traffic to and from its ports since it was made or reset."""
         asked = 0 if self.assist is None else self.assist.requests
-        return self.controlled.simulator.log.added + asked
+        return self.controlled.simulator.log.added + asked + self.pictures.requests
 
     def document(self, control: str) -> dict[str, object]:
         """Return what a script is told of it: URLs, kind, machine and seed."""
         simulator, urls = self.controlled.simulator, dict(self.controlled.urls)
         person = {} if self.assist is None else {"assist": self.assist.url}
-        where = {"url": next(iter(urls.values())), "urls": urls, **person, "control": control}
+        seen = self.pictures.document()
+        first = next(iter(urls.values()))
+        where = {"url": first, "urls": urls, **person, **seen, "control": control}
         return {**where, "kind": simulator.kind, **self.about, "seed": simulator.seed}
 
 
@@ -99,7 +146,46 @@ class SimulatedKind:
             from robolink_simulators.control.assist import serve_assist
 
             assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        return ServedCell(ControlledCell(simulator, clock, urls), assist, self.about(simulator))
+        return ServedCell(
+            ControlledCell(simulator, clock, urls),
+            assist,
+            self.about(simulator),
+            _pictures(stack, simulator, given),
+        )
+
+
+def _pictures(stack: ExitStack, simulator: AnySimulator, given: Options) -> "ServedPictures":
+    """Serve the pictures of its camera in each way that is asked for.
+
+    Raises:
+        ConfigError: The address is none, or other machines could reach it and may not; or the
+            library of GigE cameras is missing.
+        ConnectError: The port is taken.
+    """
+    ways = [given.get(way) for way in ("camera", "camera_folder", "camera_gige")]
+    if isinstance(simulator, PlcSimulator) or ways == [None, None, None]:
+        return ServedPictures()
+    address, folder, gige = ways
+    # Only now: drawing takes numpy, which the others do without.
+    from robolink_simulators.pictures.camera import DrawnCamera
+
+    camera = DrawnCamera(simulator)
+    if folder is not None:
+        from robolink_simulators.pictures.folder import PictureFolder
+
+        stack.enter_context(PictureFolder(camera, folder))
+    server = gige_camera = None
+    if address is not None:
+        from robolink_simulators.pictures.server import PictureServer
+
+        place = host_and_port(address, "--camera")
+        server = PictureServer(camera, place, allow_remote=given["allow_remote"])
+        stack.enter_context(server)
+    if gige is not None:
+        from robolink_simulators.pictures.gige_camera import drawn_gige_camera
+
+        gige_camera = stack.enter_context(drawn_gige_camera(camera, gige))
+    return ServedPictures(server, gige_camera)
 
 
 def serve_alone(kind: SimulatedKind, life: ServedLife, given: Options) -> None:
@@ -130,6 +216,8 @@ def _told(served: ServedCell, document: Mapping[str, object]) -> list[str]:
     lines = [f"  {link.ljust(10)}  {url}" for link, url in served.controlled.urls.items()]
     if served.assist is not None:
         lines.append(tr("  assist      {url}", url=served.assist.url))
+    for url in served.pictures.told:
+        lines.append(tr("  camera      {url}", url=url))
     lines.append(tr("  control     {url}", url=document["control"]))
     if served.controlled.simulator.kind == "plc":
         lines.append(tr('Try: robolink -c "{url}" expert plc check-map', url=document["url"]))

@@ -53,7 +53,7 @@ _LOOK_BACK: Final = {
 }
 
 _SET_UP: Final = {
-    "cell": (f"{GROUPS}:cell", "list new show tools check doctor scan people station accuracy"),
+    "cell": (f"{GROUPS}:cell", "list new show tools check doctor scan people station eye accuracy"),
     "sim": (f"{SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
     "panel": (f"{COMPUTER}.panel:panel", declared("Pages for a tablet at the cell")),
 }
@@ -75,12 +75,12 @@ SHORT_NAMES: Final = {
     "demo": f"{SIMULATE}.demo:demo",
     "docs": f"{SHIPPED}.docs:docs",
     "expert": f"{GROUPS}:expert",
+    "eye": f"{MEASURE}.eye:eye",
     "recipe": f"{SHIPPED}.recipe:recipe",
 }
 """Names that work but are not listed; the line below the list names ``demo``. ``check``,
-``check-contract``, ``demo``, ``docs`` and ``recipe`` are short for commands listed under ``cell``
-and ``expert``. The former commands of ``config`` name
-their replacements.
+``check-contract``, ``demo``, ``docs``, ``eye`` and ``recipe`` are short for commands listed under
+``cell`` and ``expert``. The former commands of ``config`` name their replacements.
 """
 
 RENAMED: Final = {

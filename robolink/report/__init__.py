@@ -12,6 +12,7 @@ from robolink.report._values import (
     TouchOnRecord,
 )
 from robolink.report.pictures.control_chart import chart_title
+from robolink.report.pictures.looks import LookCircle, LookPicture, look_markup
 from robolink.report.sections.summary import Heading, heading
 
 __all__ = [
@@ -19,6 +20,8 @@ __all__ = [
     "GaugeOnRecord",
     "Heading",
     "Judgement",
+    "LookCircle",
+    "LookPicture",
     "Outcome",
     "Picture",
     "Record",
@@ -27,6 +30,7 @@ __all__ = [
     "chart_picture",
     "chart_title",
     "heading",
+    "look_markup",
     "recorded_fit",
     "render",
     "render_drift",

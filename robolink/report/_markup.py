@@ -2,8 +2,10 @@
 
 import re
 import unicodedata
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 from xml.etree.ElementTree import Element, tostring
+
+from markupsafe import Markup
 
 Content: TypeAlias = Element | str | None
 
@@ -52,6 +54,15 @@ def plain(text: str) -> str:
     if text.isprintable():  # nothing invisible is
         return text
     return "".join("\ufffd" if unicodedata.category(c) in _INVISIBLE else c for c in text)
+
+
+def shown(value: Any) -> Any:  # noqa: ANN401 - any value that a template shows
+    """Return what a template shows of a value: no invisible characters, nothing for nothing."""
+    if value is None:
+        return ""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return plain(value)
+    return value
 
 
 def rounded(value: float, digits: int = 3) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -13,25 +13,40 @@ from robolink.calibration import rows_in_words, stated_mm
 from robolink.drift import CellDrift, Chart, last_statements
 from robolink.files.named import save_named
 from robolink.messages import tr
-from robolink.report._markup import drawing, plain, rounded
+from robolink.report._markup import drawing, plain, rounded, shown
 from robolink.report._values import Report
 from robolink.report.pictures.control_chart import chart_drawing, chart_title
 from robolink.report.pictures.drawing import Drawing
+from robolink.report.pictures.looks import LookPicture, look_markup
 from robolink.report.pictures.plans import draw, pose_drawings, tip_drawings
 from robolink.report.pictures.residuals import fit_drawings, order_drawings
 from robolink.report.sections import evidence, offsets, summary
 from robolink.report.sections.poses import pose_tables
 from robolink.report.sections.summary import simulated_band, simulated_verdict
 
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
-def render(report: Report, *others: Report) -> str:
+def render(report: Report, *others: Report, looks: Sequence[LookPicture] = ()) -> str:
     """Return a change as one HTML page, in Unicode.
 
     Args:
         report: What became of a tool.
         others: The same of the other tools of that change.
+        looks: Pictures of the camera with which it was measured.
+
+    Example:
+        >>> from robolink.report import render, reports_of
+        >>> from robolink import ToolOffset
+        >>> from robolink.controllers import SimpleController
+        >>> from robolink.transaction import Wanted, change_tools
+        >>> controller = SimpleController()
+        >>> receipts = change_tools(controller, [Wanted(3, ToolOffset(1, 2, -30), None)])
+        >>> entries = tuple(reversed(list(controller.outcomes.recorded(tool=3))))
+        >>> about = {"made_at": "2026-11-23T08:00:00Z", "robolink_version": "0.1.0"}
+        >>> (report,) = reports_of(entries, check="The journal is whole.", **about)
+        >>> render(report)[:15]
+        '<!DOCTYPE html>'
     """
     reports = (report, *others)
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
@@ -47,6 +62,7 @@ def render(report: Report, *others: Report) -> str:
             heading=summary.heading(reports),
             facts=summary.facts(reports),
             reports=reports,
+            looks=looks,
             record=report.record,
             report=report,
         )
@@ -60,7 +76,7 @@ def templates() -> Environment:
         loader=PackageLoader("robolink.report"),
         autoescape=True,
         undefined=StrictUndefined,
-        finalize=_shown,
+        finalize=shown,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
@@ -74,6 +90,7 @@ def templates() -> Environment:
         "rows_in_words": rows_in_words,
         "drawn": drawn,
         "drawings": drawings,
+        "look": look_markup,
         "order": lambda report: list(order_drawings(report.fit, report.evidence)),
         "offsets": offsets.offsets,
         "poses": pose_tables,
@@ -137,17 +154,13 @@ def _squares(report: Report) -> Iterator[Drawing]:
     yield from pose_drawings(report.fit)
 
 
-def _shown(value: Any) -> Any:  # noqa: ANN401 - any value that a template shows
-    """Return what a template shows of a value: no invisible characters, nothing for nothing."""
-    if value is None:
-        return ""
-    if isinstance(value, str) and not isinstance(value, Markup):
-        return plain(value)
-    return value
-
-
 def save(
-    report: Report, path: Path, *, others: Sequence[Report] = (), replace: bool = False
+    report: Report,
+    path: Path,
+    *,
+    others: Sequence[Report] = (),
+    looks: Sequence[LookPicture] = (),
+    replace: bool = False,
 ) -> None:
     """Write the page of a change; on return it is complete and on the disk.
 
@@ -155,6 +168,7 @@ def save(
         report: What became of a tool.
         path: Where.
         others: The same of the other tools of that change.
+        looks: Pictures of the camera with which it was measured.
         replace: Whether a file that is there may go.
 
     Raises:
@@ -176,7 +190,8 @@ def save(
         >>> Path("report.html").exists()
         True
     """
-    save_named(path, render(report, *others).encode("utf-8"), replace=replace)
+    page = render(report, *others, looks=looks)
+    save_named(path, page.encode("utf-8"), replace=replace)
 
 
 def render_drift(cells: Sequence[CellDrift], *, made_at: str, robolink_version: str) -> str:

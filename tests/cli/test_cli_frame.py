@@ -36,7 +36,10 @@ HEAVY = {
     "keyring",
     "prompt_toolkit",
     "importlib.metadata",
+    "PIL",
+    "cv2",
     "robolink.controllers",
+    "robolink.eye",
     "robolink_simulators",
 }
 
@@ -72,6 +75,20 @@ def test_looking_at_the_commands_loads_none_of_the_heavy_packages(arguments, env
     assert done.stdout.splitlines()[-1] == "loaded: []"
     expected = {"--version": "0.1.0", "cell": "doctor"}.get(" ".join(arguments[:1]), "calibrate")
     assert expected in done.stdout
+
+
+def test_a_tool_is_read_without_an_eye(simulator):
+    program = (
+        "import sys\n"
+        "from robolink_cli.main import run\n"
+        f"code = run(['-c', {simulator.url!r}, 'tool', 'get', '1'])\n"
+        "eyes = {'PIL', 'cv2', 'robolink.eye', 'robolink.eye.picture'} & set(sys.modules)\n"
+        "print('loaded:', sorted(eyes), code)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout.splitlines()[-1] == "loaded: [] 0", done.stdout + done.stderr
 
 
 def test_every_command_of_the_first_page_is_listed_with_its_line():

@@ -111,6 +111,8 @@ BAD = {
     "cell station list": (["all"], "Too many words"),
     "cell station show": (["B"], "no station 'B'"),
     "cell station learn": (["B", "--tool", "0"], "--tool cannot be 0"),
+    "cell eye look": (["--diameter-px", "1"], "--diameter-px"),
+    "cell eye collect": (["pictures", "--truth", "1,2"], "'1,2' is no mark"),
     "tool impact": (["--tool", "1", "--x", "nan", "--points", "1"], "not a number"),
     "status": (["--timeout", "-1"], "-1"),
     "robot where": (["here"], "Too many words"),

@@ -11,6 +11,7 @@ from robolink.messages import tr
 from robolink.model import OutcomeLog, Recorded
 from robolink.report import Report, reports_of, save
 from robolink.timing import wall_time
+from robolink_cli.access.look_pictures import looks_of
 
 
 def page_of_change(change: str) -> tuple[str, ...]:
@@ -32,7 +33,7 @@ def page_of_change(change: str) -> tuple[str, ...]:
     path = free_page(change).absolute()
     require_free(path, replace=False)
     reports, problems = reports_from(journal, entries)
-    save(reports[0], path, others=reports[1:], replace=False)
+    save(reports[0], path, others=reports[1:], looks=looks_of(change), replace=False)
     return (tr("Report: {path}", path=path), *problems)
 
 

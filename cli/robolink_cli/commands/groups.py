@@ -68,6 +68,13 @@ _CELL: Final = {
             "Show the pins, beams, surfaces and cameras of a cell: where, and how accurately known."
         ),
     ),
+    "eye": (
+        f"{MEASURE}.eye:eye",
+        declared(
+            "See what robolink finds in a camera's picture; collect pictures for tests. Moves "
+            "nothing."
+        ),
+    ),
     "accuracy": (
         f"{MEASURE}.accuracy:accuracy",
         declared(

@@ -11,7 +11,7 @@ from click.exceptions import NoArgsIsHelpError
 
 from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
-from robolink.messages import joined, tr
+from robolink.messages import in_english, joined, tr
 from robolink_cli.command_map import RENAMED
 from robolink_cli.console.error_lines import error_lines
 from robolink_cli.console.output import hand_over, sentences, show, terminal_width
@@ -236,6 +236,7 @@ def error_body(error: BaseException, typed: Sequence[str] = ()) -> dict[str, obj
     return {
         "kind": type(error).__name__,
         "what": what,
+        **_in_english(error),
         "remedy": remedy,
         "reason": getattr(error, "reason", None) if ours else None,
         "code": (getattr(error, "code", None) or None) if ours else None,
@@ -243,6 +244,13 @@ def error_body(error: BaseException, typed: Sequence[str] = ()) -> dict[str, obj
         "controller_state": outcome.effect,
         "stands": outcome_payload(outcome),
     }
+
+
+def _in_english(error: BaseException) -> dict[str, object]:
+    """Return what happened in English, where a person is told it in another language."""
+    if not isinstance(error, errors.RobolinkError) or in_english(error.what) == error.what:
+        return {}
+    return {"english": in_english(error.what)}
 
 
 def _ending(error: KeyboardInterrupt) -> EndedBy:

@@ -62,6 +62,7 @@ _WORDS: Final = (
     declared("test"),
     declared("not in remote control"),
     declared("paused"),
+    declared("held by a stop"),
     declared("without power"),
     declared("disabled"),
     declared("running"),

@@ -81,6 +81,11 @@ class ReportDraft:
         self.saved: str | None = None
 
     @property
+    def change(self) -> str:
+        """Id of the change, empty for none."""
+        return self._change
+
+    @property
     def complete(self) -> bool:
         """Whether there is something to report."""
         return bool(self._proposed)
@@ -240,11 +245,13 @@ def reporting(request: ReportRequest | None, controller: "Controller") -> "Itera
 
 def _save(request: ReportRequest | None, draft: ReportDraft, error: BaseException | None) -> None:
     from robolink.report import save
+    from robolink_cli.access.look_pictures import looks_of
 
     if request is None or not draft.complete:
         return
     try:
-        save(draft.finish(error), request.path, replace=request.replace)
+        looks = looks_of(draft.change)
+        save(draft.finish(error), request.path, looks=looks, replace=request.replace)
     except ConfigError as failure:
         note(str(failure))
     else:

@@ -1,5 +1,6 @@
 """station list, show, learn: the pins, beams, surfaces and cameras of a cell."""
 
+from pathlib import Path
 from typing import Annotated
 
 import click
@@ -103,6 +104,13 @@ def learn(
     off_in_contact: Annotated[
         bool, CliOption(help="The input goes off, not on, in contact.")
     ] = False,
+    picture: Annotated[
+        Path | None,
+        CliOption(
+            metavar="FILE",
+            help="For a camera: the page or picture to write, .html or .png. Default: ID.html.",
+        ),
+    ] = None,
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
@@ -110,6 +118,9 @@ def learn(
 
     You touch a pin twice; robolink finds beams and surfaces near the place in the cell file.
     Writes no tool. An error in the tool's offset shifts the station by the same amount.
+
+    For a camera: jog the tip over the lens first. You confirm one picture, which teaches how the
+    tip looks there; a movement of 1 mm and back shows how late pictures are.
     """
     from robolink.calibration_run import Limits, usual_box
     from robolink.model import InputEdge
@@ -130,6 +141,7 @@ def learn(
         sigma_mm=sigma_mm,
         touch=TouchPlan(contact=contact),
         assist=assist,
+        picture=picture,
         dry_run=dry_run,
         yes=yes,
     )

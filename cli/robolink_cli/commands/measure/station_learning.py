@@ -1,6 +1,7 @@
 """station learn: find a station with a known tip, show it, keep it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from robolink.calibration_run import (
     Limits,
@@ -35,7 +36,7 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.views.documents import number
 from robolink_cli.views.fit import show_plan, steps_payload
-from robolink_cli.views.stations import station_payload
+from robolink_cli.views.stations import known_stations, station_payload
 
 
 def learn(
@@ -47,10 +48,23 @@ def learn(
     sigma_mm: float | None,
     touch: TouchPlan,
     assist: str | None,
+    picture: Path | None,
     dry_run: bool,
     yes: bool,
 ) -> None:
     """Measure a station, ask, and record it. Writes no tool.
+
+    Args:
+        context: The command.
+        name: The station's name.
+        tool: The tool whose tip is known.
+        limits: How far and how fast the robot may move.
+        sigma_mm: Standard deviation of one coordinate of one touch, ``None`` where unknown.
+        touch: How a pin is touched.
+        assist: A simulator's person in place of a real one.
+        picture: Where the picture of a camera is written; ``None`` for a name of its own.
+        dry_run: Whether nothing is done.
+        yes: Whether questions are answered in advance.
 
     Raises:
         CalibrationError: The measurement is not trusted.
@@ -58,6 +72,22 @@ def learn(
         DeclinedError: A person said no, or nobody could be asked.
         UndefinedToolError: The tool has no offset.
     """
+    camera = _camera(context, name)
+    if camera is not None:
+        from robolink_cli.commands.measure.camera_learning import LearnRequest, learn_camera
+
+        if sigma_mm is not None or touch.contact is not None:
+            raise ConfigError(
+                tr("--sigma and --contact-input are for pins; {name} is a camera.", name=name),
+                remedy=tr("Leave them out."),
+            )
+        learn_camera(context, camera, LearnRequest(tool, limits, picture, assist, dry_run, yes))
+        return
+    if picture is not None:
+        raise ConfigError(
+            tr("--picture is for cameras; {name} is none.", name=name),
+            remedy=tr("Leave it out."),
+        )
     job = "" if dry_run else tr("learn station {name}", name=name)
     there = context._replace(station=name)
     with open_controller(there, changes=not dry_run, job=job) as controller:
@@ -126,6 +156,14 @@ def _height_of_pin(controller: Controller, known: Station, found: Found, tool: i
     )
     z_from = known.details.get("z_from", "")
     return replace(found, z_mm=known.z_mm, details={**found.details, "z_from": z_from})
+
+
+def _camera(context: CliContext, name: str) -> Station | None:
+    """Return a station that is a camera, as cell file and journal know it; ``None`` for others."""
+    for known in known_stations(context):
+        if known.station.id == name and known.station.kind is StationKind.CAMERA:
+            return known.station
+    return None
 
 
 def _known(context: CliContext, controller: Controller, name: str) -> Station:

@@ -53,6 +53,7 @@ def report(
     from robolink.files.named import require_free
     from robolink.report import save
     from robolink_cli.access.change_page import free_page, reports_from
+    from robolink_cli.access.look_pictures import looks_of
     from robolink_cli.commands.record.journal_lookup import journal_to_read
 
     if change is not None and file is None and change.lower().endswith(_ENDINGS):
@@ -67,7 +68,8 @@ def report(
     reports, problems = reports_from(journal, entries)
     if request is not None:
         reports = with_points(context, reports, request)
-    save(reports[0], path, others=reports[1:], replace=force)
+    looks = looks_of(id_of_change(entries[-1]))
+    save(reports[0], path, others=reports[1:], looks=looks, replace=force)
     for problem in problems:
         note(problem)
     payload = report_payload(reports, path)

@@ -199,6 +199,9 @@ class Sits:
     def following(self, look):
         return nullcontext()
 
+    def look(self):
+        pass
+
     def regard(self, subject):
         self.pages.append(subject)
 

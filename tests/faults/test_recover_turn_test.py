@@ -66,6 +66,9 @@ class Desk(_operator.AssistedOperator):
     glance: Callable[[], Any] = staticmethod(lambda: None)
     silent_s: Callable[[], float] = staticmethod(lambda: 0.0)
 
+    def look(self):
+        pass
+
     def regard(self, subject):
         pass
 

@@ -1,5 +1,6 @@
 """The history page: rows and charts come from the journal of changes that were really made."""
 
+import shutil
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.testkit.media import served
 
 from robolink.errors import ConfigError
-from robolink.journal import open_journal
+from robolink.journal import close_files, open_journal
 from robolink.model import EntryKind, NewEntry, Signature
 from tests._commands import run_command
 from tests.contract._shipped_cells import BEAMS_MM, EXAMPLES
@@ -21,21 +22,35 @@ from tests.contract._shipped_cells import BEAMS_MM, EXAMPLES
 URL = "epson+tcp://192.168.0.9:5000"
 
 
-@pytest.fixture
-def changed(robolink_state):
-    """Change a nozzle twice in a cell with two beams; return its URL."""
+@pytest.fixture(scope="module")
+def two_changes(tmp_path_factory):
+    """Change a nozzle twice in a cell with two beams; return the state folder and the URL."""
+    folder = tmp_path_factory.mktemp("state")
     simulator = EpsonSimulator(seed=3)
     simulator.machine.motors_on = True
     simulator.world.change_nozzle(2)
     for number, heading_deg in ((3, 2.0), (4, 91.0)):
         beam = LightBeam(BEAMS_MM, heading_deg, radius_mm=0.1)
         simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
-    with served(simulator, "tcp", clock=ScaledClock(40)) as url:
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        served(simulator, "tcp", clock=ScaledClock(40)) as url,
+    ):
+        patch.setenv("ROBOLINK_STATE_DIR", str(folder))
         for nozzle in ("N-1", "N-2"):
             words = ("--nozzle", nozzle, "--lot", "L", "--yes")
             done = run_command("-c", url, "change", str(EXAMPLES / "needle-beams.toml"), *words)
             assert done.code == 0, done.err
-        yield url
+    close_files()
+    return folder, url
+
+
+@pytest.fixture
+def changed(two_changes, robolink_state):
+    """Both changes in this test's own state folder; returns the URL of the cell."""
+    folder, url = two_changes
+    shutil.copytree(folder, robolink_state, dirs_exist_ok=True)
+    return url
 
 
 def test_two_changes_are_rows_charts_and_pages_of_this_cell(changed):

@@ -76,6 +76,7 @@ class Panel:
                 Route("/", self._overview),
                 Route("/cell/{cell}", self._cell),
                 Route("/cell/{cell}/history", self._history),
+                Route("/cell/{cell}/picture", self._picture),
                 Route("/cell/{cell}/report/{change}", self._report),
                 Route("/login", self._login),
                 Route("/pair", self._pair),
@@ -118,7 +119,8 @@ class Panel:
                 with speaking_in(taste.language):
                     seat = holder.who or tr("the tablet at {address}", address=holder.address)
         role = tablet.session.role if tablet.session else ""
-        return Watcher(taste.language, taste.dark, seat, tablet.who, role, tablet.paired)
+        young = tablet.session is None or self._access.logins.is_fresh(tablet.session)
+        return Watcher(taste.language, taste.dark, seat, tablet.who, role, tablet.paired, young)
 
     def _token(self, asked: HTTPConnection) -> str:
         return self._access.token_of(asked.scope)
@@ -177,6 +179,16 @@ class Panel:
             return _nothing_here()
         change = request.path_params["change"]
         return HTMLResponse(await asyncio.to_thread(page_of, board.cell.url, change))
+
+    async def _picture(self, request: Request) -> Response:
+        """Answer with the newest picture of the cell's camera, a PNG file."""
+        board = self.hub.boards.get(request.path_params["cell"])
+        if board is None or board.camera is None:
+            return _nothing_here()
+        # Circles of one picture on another would lie.
+        if request.query_params.get("v") != board.camera.stamp:
+            return _nothing_here()
+        return Response(board.camera.picture.png, media_type="image/png")
 
     async def _login(self, request: Request) -> Response:
         return self._about_people("login", request)

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 from robolink.messages import spoken, tr
+from robolink_cli.panel.camera import CameraLook, cameras_of
 from robolink_cli.panel.cards import CellCard, JobOffer
 from robolink_cli.panel.jobs import KINDS, JobKind, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
@@ -17,7 +18,7 @@ from robolink_cli.panel.recipes import RecipeOffer
 from robolink_cli.panel.record import Standing
 from robolink_cli.panel.watch import CellWatch, card_of
 from robolink_cli.panel.words import speaking_in
-from robolink_cli.wizard.views.records import MovingView, View
+from robolink_cli.wizard.views.records import MovingView, TouchView, View
 
 if TYPE_CHECKING:
     from robolink.config import Cell
@@ -76,6 +77,9 @@ class Board:
         self.said: tuple[str, ...] = ()
         self.base = (1 + secrets.randbelow(1000)) * _NUMBERS
         self.opened = False
+        self.cameras = cameras_of(cell.configured)
+        self.camera: CameraLook | None = None
+        self.camera_s = 0.0
         self._drawn: dict[Watcher, Parts] = {}
         self._drawn_s = 0.0
 
@@ -91,9 +95,12 @@ class Board:
 
     @property
     def moving(self) -> bool:
-        """Whether a job moves the robot by itself."""
-        view = self.view
-        return view is not None and isinstance(view.body, MovingView)
+        """Whether the robot moves: by itself, by a step of a jog, or as long as a key is held."""
+        view, job = self.view, self.job
+        if view is None or job is None:
+            return False
+        jogs = isinstance(view.body, TouchView) and (not view.waits or job.is_held)
+        return jogs or isinstance(view.body, MovingView)
 
     @property
     def simulated(self) -> bool:
@@ -138,9 +145,9 @@ class Board:
         if found is None:
             view = self.view
             found = (
-                pages.screen(view, watcher)
+                pages.screen(view, watcher, camera=self.camera)
                 if view is not None
-                else pages.idle(self.card(watcher, now_s), watcher)
+                else pages.idle(self.card(watcher, now_s), watcher, camera=self.camera)
             )
             self._drawn[watcher] = found
         return found
@@ -177,7 +184,7 @@ class Board:
                 found += [
                     JobOffer(
                         kind.name,
-                        tr("Find the station {station} again", station=station),
+                        self._learning(station),
                         values={"station": station},
                         why_not=why_not,
                     )
@@ -186,6 +193,14 @@ class Board:
             else:
                 found.append(JobOffer(kind.name, spoken(kind.title), why_not=why_not))
         return tuple(found)
+
+    def _learning(self, station: str) -> str:
+        """Return what learning a station is called."""
+        configured = self.cell.configured
+        stations = (configured.settings.stations or {}) if configured is not None else {}
+        if getattr(stations.get(station), "kind", "") == "camera":
+            return tr("Teach the camera {station} again", station=station)
+        return tr("Find the station {station} again", station=station)
 
     def _names_differ(self) -> bool:
         return len({one.name for one in self.recipes}) == len(self.recipes)
@@ -237,7 +252,11 @@ class Board:
             return bool(self.standing.interrupted)
         if kind.of_station:
             return self.cell.tool is not None
-        return kind.name != "release" or self.standing.stopped is not None
+        if kind.name == "release":
+            look = self.watch.look
+            held = look is not None and look.read.get("held_by_a_stop") is True
+            return held or self.standing.stopped is not None
+        return True
 
     def _why_not(self, kind: JobKind, watcher: Watcher) -> str:
         if self.standing.interrupted and kind.name not in ("recover", "release"):

@@ -18,6 +18,7 @@ from robolink.timing import local_label, wall_time
 from robolink.transaction import id_of_change
 from robolink.transport import parse_url
 from robolink_cli.access.change_page import reports_from
+from robolink_cli.access.look_pictures import looks_of
 from robolink_cli.panel.cards import ChangeRow, ChartCard
 from robolink_cli.panel.record import cell_drift, journal_there, person_of
 
@@ -88,7 +89,7 @@ def page_of(url: str, change: str) -> str:
             remedy=tr("Open the history of the cell and choose a change there."),
         )
     reports, _ = reports_from(journal, entries)
-    return render(*reports)
+    return render(*reports, looks=looks_of(change))
 
 
 def _rows(journal: Journal, address: str) -> Iterator[ChangeRow]:

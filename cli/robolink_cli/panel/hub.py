@@ -14,10 +14,12 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
 from robolink.errors import RobolinkError
+from robolink.locale.languages import ENGLISH
 from robolink.messages import tr
 from robolink.transport import far_end_of
 from robolink_cli.console.output import show
 from robolink_cli.panel.board import OVERVIEW_S, Board, PanelCell
+from robolink_cli.panel.camera import READ_S, newest_of
 from robolink_cli.panel.cards import CellCard
 from robolink_cli.panel.jobs import JobKind, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
@@ -134,6 +136,9 @@ class Hub:
     def _tend(self, board: Board, now_s: float) -> None:
         job = board.job
         shown = any(live.cell in ("", board.name) for live in self.lives)
+        if board.cameras and now_s - board.camera_s >= READ_S and self._is_open(board):
+            board.camera_s = now_s
+            self.spawn(self._read_camera(board))
         if shown and now_s - board.record_s >= RECORD_S:
             self.spawn(self.read_standing(board))
         if job is None:
@@ -153,8 +158,13 @@ class Hub:
         )
 
     async def _look(self, board: Board) -> None:
-        await board.watch.take()
+        await board.watch.take(self._language_at(board.name))
         await self.read_standing(board)
+
+    def _language_at(self, cell: str) -> str:
+        """Return the language of who looks at a cell, else of who looks at all."""
+        pages = sorted(self.lives, key=lambda live: live.cell == cell, reverse=True)
+        return next((live.watcher().language for live in pages if live.cell in ("", cell)), ENGLISH)
 
     async def read_standing(self, board: Board) -> None:
         """Read what is on record of a cell."""
@@ -163,6 +173,16 @@ class Hub:
         board.standing = await asyncio.to_thread(standing_of, cell.url, board.standing)
         board.recipes = await asyncio.to_thread(recipes_of, cell.configured)
         if before != (board.standing, board.recipes):
+            board.renew()
+
+    def _is_open(self, board: Board) -> bool:
+        return any(live.cell == board.name for live in self.lives)
+
+    async def _read_camera(self, board: Board) -> None:
+        """Read the newest picture of the cell's cameras, and show it where it is another."""
+        before = board.camera
+        board.camera = await asyncio.to_thread(newest_of, board.cameras, before)
+        if board.camera is not before:
             board.renew()
 
     def spawn(self, work: Any) -> None:  # noqa: ANN401 - any coroutine
@@ -311,7 +331,9 @@ class Hub:
         """Return the frame that shows that this server is alive."""
         board = self.boards.get(live.cell)
         age_ms, status = board.status(now_s) if board is not None else (None, {})
-        return {"t": "beat", "age_ms": age_ms, "status": status}
+        camera = board.camera if board is not None else None
+        look_ms = None if camera is None else round(camera.age_s() * 1000)
+        return {"t": "beat", "age_ms": age_ms, "look_ms": look_ms, "status": status}
 
 
 def keys_of(cell: PanelCell) -> frozenset[str]:

@@ -16,10 +16,11 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from robolink.messages import declared, spoken
+from robolink.messages import spoken
 from robolink.model import PersonRole
 from robolink_cli.console.language import VARIABLE
 from robolink_cli.panel.words import speaking_in
+from robolink_cli.wizard.views.page_ways import TITLES
 from robolink_cli.wizard.views.records import View
 from robolink_cli.wizard.views.wire import from_wire
 
@@ -28,6 +29,10 @@ MOST_BYTES: Final = 64 * 1024
 
 _MOST_UNSENT: Final = 16 * 1024
 """Bytes that a job has not taken yet, from which beats and signs of life are left out."""
+
+_HELD_S: Final = 1.0
+"""For so long in s after its last sign a finger counts as down: longer than its lease, and a
+step."""
 
 _IN_ORDER: Final = range(70)
 """Exit codes of a command that ended in order; 70 is for a bug."""
@@ -62,14 +67,14 @@ class JobKind:
 KINDS: Final = {
     kind.name: kind
     for kind in (
-        JobKind("change", declared("Change a needle or nozzle"), ("change",), of_recipe=True),
-        JobKind("recover", declared("Finish or undo the interrupted job"), ("recover",)),
-        JobKind("release", declared("Allow movement again after a stop."), ("robot", "release")),
-        JobKind("check", declared("Check the cell"), ("cell", "check")),
-        JobKind("undo", declared("Undo the last tool change"), ("undo",), PersonRole.ENGINEER),
+        JobKind("change", TITLES["change"], ("change",), of_recipe=True),
+        JobKind("recover", TITLES["recover"], ("recover",)),
+        JobKind("release", TITLES["release"], ("robot", "release")),
+        JobKind("check", TITLES["check"], ("cell", "check")),
+        JobKind("undo", TITLES["undo"], ("undo",), PersonRole.ENGINEER),
         JobKind(
             "station",
-            declared("Find a station again"),
+            TITLES["station"],
             ("cell", "station", "learn"),
             PersonRole.ENGINEER,
             of_station=True,
@@ -147,6 +152,7 @@ class PanelJob:
         self._errors = b""
         self._process: asyncio.subprocess.Process | None = None
         self._writer: asyncio.StreamWriter | None = None
+        self._finger, self._finger_s = "", 0.0
         self._task: asyncio.Task[None] | None = None
 
     @property
@@ -199,15 +205,25 @@ class PanelJob:
 
     def hold(self, number: int, axis: str, finger: str) -> None:
         """Pass on that a finger came down on a key that repeats."""
+        self._finger, self._finger_s = finger, time.monotonic()
         self._send({"t": "hold", "number": number, "axis": axis, "finger": finger})
 
     def beat(self, finger: str) -> None:
         """Pass on that a finger is still down."""
+        if finger == self._finger:
+            self._finger_s = time.monotonic()
         self._send({"t": "beat", "finger": finger}, may_be_lost=True)
 
     def release(self, finger: str) -> None:
         """Pass on that a finger is up."""
+        if finger == self._finger:
+            self._finger = ""
         self._send({"t": "release", "finger": finger})
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a finger is on a key that repeats, or was until just now."""
+        return bool(self._finger) and time.monotonic() - self._finger_s < _HELD_S
 
     def alive(self) -> None:
         """Pass on that the seat's tablet is heard."""

@@ -7,17 +7,18 @@ the frame are in the language of the tablet, those of a job in the language of t
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any, Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 
 from robolink.locale.languages import CHINESE, ENGLISH, LANGUAGES, translator
-from robolink.report._markup import plain
+from robolink.report import look_markup
+from robolink.report._markup import shown
 from robolink_cli.panel import drawings
+from robolink_cli.panel.camera import OLD_S, CameraLook
 from robolink_cli.panel.cards import CellCard
 from robolink_cli.wizard.views.records import (
     Action,
@@ -59,6 +60,9 @@ _SCREENS: Final[Mapping[type[object], str]] = {
     QuestionView: "question",
     EndView: "end",
 }
+_BESIDE_CAMERA: Final = frozenset({"choice", "moving", "wait", "question", "end", "idle"})
+"""Screens beside which a camera's picture is shown; on the others all room is needed."""
+
 _PLACES: Final = {
     "up": "\u25b2",
     "down": "\u25bc",
@@ -91,6 +95,7 @@ class Watcher:
         who: Who is signed in; empty for nobody.
         role: ``onlooker``, ``operator`` or ``engineer``; empty where nobody is signed in.
         paired: Whether a STOP from this tablet is carried out.
+        young: Whether the PIN was given so recently that what moves or writes may be pressed.
     """
 
     language: str = ENGLISH
@@ -99,6 +104,7 @@ class Watcher:
     who: str = ""
     role: str = ""
     paired: bool = True
+    young: bool = True
 
     @property
     def presses(self) -> bool:
@@ -137,14 +143,33 @@ class Pages:
         self._environment = _environment()
         self.version = _version()
 
-    def screen(self, view: View, watcher: Watcher) -> Parts:
-        """Return the parts that show a view."""
-        name = _SCREENS[type(view.body)]
-        return self._parts(name, watcher, view=view, body=view.body, cell=view.head.cell)
+    def screen(self, view: View, watcher: Watcher, *, camera: CameraLook | None = None) -> Parts:
+        """Return the parts that show a view.
 
-    def idle(self, card: CellCard, watcher: Watcher) -> Parts:
+        Args:
+            view: What the job shows.
+            watcher: Who looks.
+            camera: What a camera of the cell saw last, ``None`` for nothing.
+        """
+        name = _SCREENS[type(view.body)]
+        cell = view.head.cell
+        parts = self._parts(name, watcher, view=view, body=view.body, cell=cell)
+        return self._with_camera(parts, watcher, cell, camera)
+
+    def idle(self, card: CellCard, watcher: Watcher, *, camera: CameraLook | None = None) -> Parts:
         """Return the parts that show a cell on which no job runs."""
-        return self._parts("idle", watcher, card=card, cell=card.name)
+        parts = self._parts("idle", watcher, card=card, cell=card.name)
+        return self._with_camera(parts, watcher, card.name, camera)
+
+    def _with_camera(
+        self, parts: Parts, watcher: Watcher, cell: str, camera: CameraLook | None
+    ) -> Parts:
+        """Return the parts with the camera's picture beside them, on screens that have room."""
+        if camera is None or parts.screen not in _BESIDE_CAMERA:
+            return parts
+        figure = self._filled("camera.html", watcher, cell=cell, camera=camera)
+        main = f'<div class="beside"><div class="own">{parts.main}</div>{figure}</div>'
+        return replace(parts, main=main)
 
     def overview(self, cells: Sequence[CellCard], watcher: Watcher) -> Parts:
         """Return the parts that show all cells."""
@@ -241,7 +266,7 @@ def _environment() -> Environment:
         loader=PackageLoader("robolink_cli.panel"),
         autoescape=True,
         undefined=StrictUndefined,
-        finalize=_shown,
+        finalize=shown,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -250,6 +275,8 @@ def _environment() -> Environment:
         "fit_picture": drawings.fit_drawing,
         "turn_picture": drawings.turn_drawing,
         "before_after": drawings.before_after_drawing,
+        "look_picture": look_markup,
+        "old_s": OLD_S,
         "in_order": _in_order,
         "label_of": _label_of,
         "body_of": _body_of,
@@ -259,15 +286,6 @@ def _environment() -> Environment:
     }
     environment.filters["step"] = lambda size: f"{size:g}"
     return environment
-
-
-def _shown(value: Any) -> Any:  # noqa: ANN401 - any value that a template shows
-    """Return what a page shows of a value: no invisible characters, nothing for nothing."""
-    if value is None:
-        return ""
-    if isinstance(value, str) and not isinstance(value, Markup):
-        return plain(value)
-    return value
 
 
 def _in_order(actions: Sequence[Action]) -> list[Action]:

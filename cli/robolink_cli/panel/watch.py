@@ -24,6 +24,7 @@ from robolink_cli.console.language import VARIABLE
 from robolink_cli.console.shell_words import state_word
 from robolink_cli.panel.cards import CellCard
 from robolink_cli.panel.record import Standing
+from robolink_cli.panel.words import spoken_language
 
 LEAST_APART_S: Final = 5.0
 """Shortest time in s between two looks at a cell that a page asked for."""
@@ -48,13 +49,17 @@ class CellLook:
         at_s: When, monotonic.
         at: When, as a label.
         read: The document of ``robolink status``; empty where it ended in an error.
-        failed: Why nothing was read; empty where something was.
+        failed: Why nothing was read, in English; empty where something was.
+        failed_here: The same in the language of the look.
+        language: Of the look.
     """
 
     at_s: float
     at: str
     read: dict[str, Any] = field(default_factory=dict)
     failed: str = ""
+    failed_here: str = ""
+    language: str = ENGLISH
 
     @property
     def state(self) -> str:
@@ -71,6 +76,11 @@ class CellLook:
         if is_simulated_name(name) or said is True:
             return True
         return False if said is False or (name and "://" not in name) else None
+
+    def why(self) -> str:
+        """Return why nothing was read, in the language that is spoken."""
+        here = self.failed_here if self.language == spoken_language() else ""
+        return here or spoken(self.failed)
 
     @property
     def taken_s(self) -> float:
@@ -122,20 +132,24 @@ class CellWatch:
         apart_s = LEAST_APART_S if wanted else self.every_s
         return apart_s is not None and now_s - self.look.at_s >= apart_s
 
-    async def take(self) -> None:
-        """Look."""
+    async def take(self, language: str = ENGLISH) -> None:
+        """Look.
+
+        Args:
+            language: In which what is read is told.
+        """
         if self.looking:
             return
         self.looking = True
         try:
             async with self._slots:
-                self.look = await _looked(self.cell)
+                self.look = await _looked(self.cell, language)
         finally:
             self.looking = False
         self._changed()
 
 
-async def _looked(cell: str) -> CellLook:
+async def _looked(cell: str, language: str) -> CellLook:
     try:
         process = await asyncio.create_subprocess_exec(
             sys.executable,
@@ -143,7 +157,7 @@ async def _looked(cell: str) -> CellLook:
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
-            env={**os.environ, VARIABLE: ENGLISH, "PYTHONIOENCODING": "utf-8"},
+            env={**os.environ, VARIABLE: language, "PYTHONIOENCODING": "utf-8"},
             start_new_session=os.name != "nt",
         )
         try:
@@ -157,8 +171,11 @@ async def _looked(cell: str) -> CellLook:
         return CellLook(time.monotonic(), wall_label(), failed=str(error) or type(error).__name__)
     now_s, at = time.monotonic(), wall_label()
     if "error" in said:
-        return CellLook(now_s, at, failed=str(said["error"].get("what", "")) or NO_ANSWER)
-    return CellLook(now_s, at, read=said)
+        ended = said["error"]
+        here = str(ended.get("what", ""))
+        failed = str(ended.get("english") or here) or NO_ANSWER
+        return CellLook(now_s, at, failed=failed, failed_here=here or NO_ANSWER, language=language)
+    return CellLook(now_s, at, read=said, language=language)
 
 
 def card_of(
@@ -184,7 +201,7 @@ def card_of(
         told = tr("Looking ...") if watch.looking else tr("Open the cell to look at it.")
         card = replace(card, lines=(told,))
     elif look.failed:
-        card = replace(card, word=tr("no answer"), lines=(spoken(look.failed), _when(look)))
+        card = replace(card, word=tr("no answer"), lines=(look.why(), _when(look)))
     else:
         card = replace(
             card,

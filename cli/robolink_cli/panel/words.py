@@ -35,6 +35,11 @@ def speaking_in(language: str) -> Iterator[None]:
         _language.reset(token)
 
 
+def spoken_language() -> str:
+    """Return the language that is spoken."""
+    return _language.get()
+
+
 def _translated(sentence: str) -> str:
     translate = _translator(_language.get())
     return sentence if translate is None else translate(sentence)

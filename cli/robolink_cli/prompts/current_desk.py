@@ -23,6 +23,9 @@ class AskingDesk(Protocol):
     def tell(self, text: str) -> None:
         """Show something that needs no answer."""
 
+    def look(self) -> None:
+        """Look at the controller now, and show what was read."""
+
     def regard(self, subject: object) -> None:
         """Note ``subject`` as the subject of what comes next."""
 

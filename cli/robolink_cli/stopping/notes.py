@@ -41,7 +41,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
             controller=url.partition("?")[0],
         )
     note(found.sentence)
-    if not asked(tr("Has the cause been checked, and may the robot move again?")):
+    if not asked(may_move_again()):
         raise DeclinedError(not_yes(), remedy=tr("Nothing was sent."))
     _clear(keys, name)
 
@@ -79,23 +79,51 @@ def last_known(url: str) -> str:
     return name if is_own_name(name) else ""
 
 
-def release_stop(request: "StopRequest", *, yes: bool) -> dict[str, object]:
-    """Show the note of a stop and remove it when a person agrees.
-
-    Raises:
-        ConfigError: No controller is named, or the note cannot be taken away.
-        DeclinedError: The answer was no.
-    """
-    from robolink_cli.prompts.questions import agree
-
-    url = url_of(request)
-    keys, name = far_end_of(url), last_known(url)
-    found = find_note(keys, name)
+def noted_stop(url: str) -> StopNote | None:
+    """Return the note of a stop of the controller at a URL, shown; ``None`` where there is none."""
+    found = find_note(far_end_of(url), last_known(url))
     if found is not None:
         note(found.sentence)
-        agree(tr("Has the cause been checked, and may the robot move again?"), yes=yes)
-        _clear(keys, name)
-    return {"released": found is not None, "note": _plain(found)}
+    return found
+
+
+def may_move_again() -> str:
+    """Return the question before anything moves again after a stop."""
+    return tr("Has the cause been checked, and may the robot move again?")
+
+
+def clear_noted_stop(url: str, agreed: StopNote) -> None:
+    """Remove the note of a stop, because a person agreed when it was shown.
+
+    Args:
+        url: The controller.
+        agreed: The note.
+
+    Raises:
+        StoppedError: The robot was stopped again meanwhile: nobody has agreed to that.
+        ConfigError: It cannot be taken away.
+    """
+    keys, name = far_end_of(url), last_known(url)
+    now = find_note(keys, name)
+    if now is not None and now != agreed:
+        raise StoppedError(
+            now.sentence,
+            remedy=tr("Look into the cell, then release the stop again."),
+            controller=url.partition("?")[0],
+        )
+    _clear(keys, name)
+
+
+def note_document(found: StopNote | None) -> dict[str, object] | None:
+    """Return the note of a stop as plain JSON."""
+    if found is None:
+        return None
+    return {
+        "who": found.who,
+        "when": found.when,
+        "controller": found.url,
+        "confirmed": found.confirmed,
+    }
 
 
 def url_of(request: "StopRequest") -> str:
@@ -130,14 +158,3 @@ def _clear(keys: frozenset[str], name: str) -> None:
             ),
             remedy=tr("Make the state folder writable for this user, then try again."),
         ) from error
-
-
-def _plain(found: StopNote | None) -> dict[str, object] | None:
-    if found is None:
-        return None
-    return {
-        "who": found.who,
-        "when": found.when,
-        "controller": found.url,
-        "confirmed": found.confirmed,
-    }

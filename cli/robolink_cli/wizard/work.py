@@ -82,7 +82,7 @@ class Desk:
         end_s = self._now_s() + wait_s
         if not self._told_waiting:
             self._told_waiting = True
-            self._look()
+            self.look()
             self._happened.put(WaitsForAnswer(self._number, self._now_s()))
         while True:
             heed()
@@ -92,7 +92,7 @@ class Desk:
                 answer = self._answers.get(timeout=max(0.0, min(GLANCE_S, left_s)))
             except queue.Empty:
                 if self._now_s() - self._looked_s >= GLANCE_S:
-                    self._look()
+                    self.look()
                 if self._now_s() >= end_s:
                     return None
                 continue
@@ -118,7 +118,7 @@ class Desk:
                 self.regard(MovementHeld(reason))
                 self.tell(reason)
                 told = reason
-            self._look()
+            self.look()
             time.sleep(GLANCE_S)
         if told:
             self.regard(MovementHeld(""))
@@ -181,7 +181,8 @@ class Desk:
         """Answer; for the face."""
         self._answers.put(answer)
 
-    def _look(self) -> None:
+    def look(self) -> None:
+        """Look at the controller now, and show what was read."""
         self._looked_s = self._now_s()
         reading = self.glance()
         if reading is not None:

@@ -179,7 +179,7 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
         ErrorClass.NOT_PERMITTED: tr("Bring the machine to its service state (xPermit)."),
         ErrorClass.DISABLED: tr("Run 'robolink robot motors on' when the cell is clear."),
         ErrorClass.ERRORSTOP: tr("Remove the cause, then run 'robolink robot reset'."),
-        ErrorClass.STOPPING: tr("When the cell is clear, run 'robolink robot reset'."),
+        ErrorClass.STOPPING: tr("When the cell is clear, run 'robolink robot release'."),
         ErrorClass.MOVING: tr("Wait for the end of the movement."),
         ErrorClass.BUSY: tr("Wait for the running command, or stop it."),
         ErrorClass.QUEUE_FULL: tr("Wait for the first movement to end."),

@@ -43,6 +43,7 @@ def condition_of(now: Response) -> dict[str, object]:
         "text": error_meaning(now.error_class) if status_of(now).code else "",
         "selected_tool": now.tool_slot,
         "tool_known": is_tool_known(now),
+        "held_by_a_stop": now.group_state == GroupState.STOPPING,
         "motors_on": now.group_state != GroupState.DISABLED,
         "powered": bool(bits & Bits.POWERED),
         "owned": bool(bits & Bits.OWNED),
@@ -165,7 +166,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
         return (
             NotReadyReason.PAUSED,
             tr("The axis group is held by a stop."),
-            tr("When the cell is clear, run 'robolink robot reset'."),
+            tr("When the cell is clear, run 'robolink robot release'."),
         )
     if now.group_state == GroupState.DISABLED:
         return (

@@ -53,10 +53,10 @@ if TYPE_CHECKING:
     from robolink.controllers.softmotion.facts import MailboxFinding
 
 
-_RESETS: Final = (
-    (GroupState.ERRORSTOP, Command(0, Opcode.RESET)),
-    (GroupState.STOPPING, Command(0, Opcode.STOP, operands=(1, 0, 0, 0))),
-)
+_RELEASE: Final = (GroupState.STOPPING, Command(0, Opcode.STOP, operands=(1, 0, 0, 0)))
+"""The command that releases a stop which holds the group."""
+
+_RESETS: Final = ((GroupState.ERRORSTOP, Command(0, Opcode.RESET)), _RELEASE)
 """Commands that lead out of a state of the group; after an error, a stop may still be active."""
 
 _SIMULATED: Final = "sim"
@@ -73,7 +73,8 @@ class SoftMotionController(ControllerCore):
 
     The mailbox is owned from the first command that needs it until :meth:`close`; reading the
     state, the position and the tool slots needs no ownership. A stop holds the group on the PLC
-    until :meth:`reset_fault`. The profile ``tools`` of the mailbox program moves nothing.
+    until :meth:`release_hold` or :meth:`reset_fault`. The profile ``tools`` of the mailbox program
+    moves nothing.
 
     Attributes:
         tools: Slots 1 to 15.
@@ -233,21 +234,37 @@ class SoftMotionController(ControllerCore):
             NotReadyError: The machine does not permit it.
             ControllerFaultError: The error is still there afterwards.
         """
-        mailbox = self._mailbox
-        request = tr("reset")
-        with mailbox.lock.held(request, calming=True):
-            now = mailbox.snapshots.take()
-            for state, draft in _RESETS:
-                if now.group_state == state:
-                    mailbox.prepare(draft, describe(draft))
-                    mailbox.commands.ownership.require(describe(draft))
-                    now = self._left(state, mailbox.commands.carry_out(draft))
+        with self._mailbox.lock.held(tr("reset"), calming=True):
+            now = self._led_out(_RESETS)
             if any(now.group_state == state for state, _draft in _RESETS):
                 raise ControllerFaultError(
                     tr("The axis group is still in the same state after the reset."),
                     code=now.error_class,
                     remedy=tr("Remove the cause at the drives or the machine, then reset again."),
                 )
+
+    def release_hold(self) -> bool:
+        """Release what a stop holds on the PLC, at a person's request; return whether it held.
+
+        No error is cleared, and nothing moves: the group may be moved again. Nothing is sent where
+        no stop holds it.
+
+        Raises:
+            NotReadyError: The machine does not permit it.
+            LeaseHeldError: Another client owns the mailbox.
+            ControllerFaultError: The group is held still: not by a stop of the mailbox.
+        """
+        with self._mailbox.lock.held(tr("release of the stop"), calming=True):
+            if self._mailbox.snapshots.take().group_state != GroupState.STOPPING:
+                return False
+            now = self._led_out((_RELEASE,))
+            if now.group_state == GroupState.STOPPING:
+                raise ControllerFaultError(
+                    tr("The release did not free the axis group."),
+                    code=now.error_class,
+                    remedy=tr("Find what holds it: the machine's own program, or a stop button."),
+                )
+            return True
 
     def motors(self, on: bool) -> None:
         """Enable or disable the group, and confirm it; the PLC's program switches the drives."""
@@ -290,6 +307,17 @@ class SoftMotionController(ControllerCore):
 
     def _close_link(self) -> None:
         self._mailbox.wire.close()
+
+    def _led_out(self, resets: tuple[tuple[GroupState, Command], ...]) -> Response:
+        """Send, in this order, what leads out of each state that the group is in."""
+        mailbox = self._mailbox
+        now = mailbox.snapshots.take()
+        for state, draft in resets:
+            if now.group_state == state:
+                mailbox.prepare(draft, describe(draft))
+                mailbox.commands.ownership.require(describe(draft))
+                now = self._left(state, mailbox.commands.carry_out(draft))
+        return now
 
     def _left(self, state: GroupState, now: Response) -> Response:
         """Give the group the cycles that it needs to leave a state.

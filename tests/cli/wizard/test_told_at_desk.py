@@ -281,6 +281,9 @@ class Chooser(Desk):
         self.rows, self.marked = list(rows), []
         self.header = None
 
+    def look(self):
+        pass
+
     def regard(self, subject):
         if isinstance(subject, ChoiceSubject):
             self.marked.append((subject.options[subject.marked or 0].split()[0], subject.step))
@@ -530,6 +533,9 @@ class Onlooker(Desk):
     def __init__(self):
         super().__init__()
         self.subjects = []
+
+    def look(self):
+        pass
 
     def regard(self, subject):
         self.subjects.append(subject)

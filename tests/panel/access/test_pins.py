@@ -260,6 +260,9 @@ def test_a_pin_counts_for_fifteen_minutes(panel):
         refused = stream.ask(t="press", number=1, action="start", press="p1")
         assert refused["t"] == "refused"
         assert refused["press"] == "p1"
+        # A key that is held is not let go because the PIN grew old; none is held from now on.
+        assert stream.ask(t="beat", finger="f")["t"] == "carried out"
+        assert stream.ask(t="hold", number=1, axis="x+", finger="g")["t"] == "refused"
         # What ends something needs none.
         assert stream.ask(t="press", number=1, action="leave")["t"] == "carried out"
     assert browser.log_in(MEI).status == 200

@@ -32,6 +32,7 @@ GETS = {
     "/",
     "/cell/{cell}",
     "/cell/{cell}/history",
+    "/cell/{cell}/picture",
     "/cell/{cell}/report/{change}",
     "/login",
     "/pair",
@@ -109,7 +110,7 @@ class Product:
         thread = threading.Thread(target=lambda: asyncio.run(run()))
         thread.start()
         try:
-            assert ready.wait(20)
+            assert ready.wait(60)
             yield self
         finally:
             loop_of[0].call_soon_threadsafe(loop_of[1].set)

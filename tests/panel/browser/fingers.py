@@ -2,8 +2,11 @@
 
 import time
 
+# A person scrolls to what is out of view on a full screen.
 MIDDLE = """(selector) => {
-  const box = document.querySelector(selector)?.getBoundingClientRect();
+  const found = document.querySelector(selector);
+  if (found?.closest("main")) found.scrollIntoView({block: "nearest"});
+  const box = found?.getBoundingClientRect();
   return box && box.width ? {x: box.x + box.width / 2, y: box.y + box.height / 2} : null;
 }"""
 

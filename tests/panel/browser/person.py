@@ -116,9 +116,15 @@ class Person:
     def jogs(self, axis, size):
         """Tap one step, and wait until the tip has moved."""
         chosen = f'[data-action=size][data-value="{size:g}"]'
-        if self.page.get_attribute(chosen, "aria-pressed") != "true":
+        for _ in range(5):  # what a busy computer took too late it does not do
+            if self.page.get_attribute(chosen, "aria-pressed") == "true":
+                break
             self.tap(chosen)
-            self.page.wait_for_selector(f"{chosen}[aria-pressed=true]")
+            end_s = time.monotonic() + 4.0
+            while time.monotonic() < end_s:
+                if self.page.get_attribute(chosen, "aria-pressed") == "true":
+                    break
+                time.sleep(0.02)
         before = self.cell.tip_mm()
         key = f'[data-action=jog][data-value="{axis}{size:g}"]:not([aria-disabled])'
         for _ in range(5):  # a press while the last step still ends does nothing
@@ -129,7 +135,7 @@ class Person:
                     self.page.wait_for_selector(key)
                     return
                 time.sleep(0.01)
-        raise AssertionError(f"{key} moves nothing")
+        raise AssertionError(f"{key} moves nothing: {self.page.inner_text('body')}")
 
 
 ASKED = ",".join(

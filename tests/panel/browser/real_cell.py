@@ -11,13 +11,16 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from robolink_cli import main
 from robolink_cli.panel.guard.people import Pins
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.control.assist import InProcessEyes, serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.model import Secret
 
@@ -30,6 +33,11 @@ ROLES = {"Chen": "operator", "Meier": "engineer"}
 class RealCell:
     """A robot that knows its pin, with a new needle, and the panel that shows it.
 
+    Args:
+        folder: Where its files are.
+        speed: How fast its time passes.
+        plc: Whether it is a PLC, and not an EPSON controller.
+
     Attributes:
         simulator: The robot.
         eyes: See its tip.
@@ -37,18 +45,19 @@ class RealCell:
         process: The panel's process.
     """
 
-    def __init__(self, folder, speed=20.0):
-        self.folder, self._speed = folder, speed
+    def __init__(self, folder, speed=20.0, *, plc=False):
+        self.folder, self._speed, self._plc = folder, speed, plc
         for name, pin in PINS.items():
             Pins().set(name, Secret(pin))
-        self.simulator = EpsonSimulator(seed=7)
+        self.simulator: Any = SoftMotionSimulator(seed=3) if plc else EpsonSimulator(seed=7)
+        self._serve = serve_modbus_tcp if plc else serve_tcp
         self.eyes = InProcessEyes(self.simulator)
         self.process: subprocess.Popen[bytes] | None = None
         self.url, self.port = "", 0
 
     def __enter__(self):
         clock = ScaledClock(self._speed)
-        self._host = serve_tcp(self.simulator, clock=clock)
+        self._host = self._serve(self.simulator, clock=clock)
         host = self._host.__enter__()
         self.relay = Relay(int(host.url.rpartition(":")[2]))
         with serve_assist(self.simulator, clock=clock) as eyes:
@@ -59,7 +68,11 @@ class RealCell:
             'remote_timeout_confirmed_by = "the simulator"\n[cells.line3.people]\n'
             + "".join(f'{name} = "{role}"\n' for name, role in ROLES.items())
         )
-        (self.folder / "needle.toml").write_bytes(RECIPE.read_bytes())
+        recipe = RECIPE.read_text()
+        if self._plc:  # its safe pose is one of the EPSON arm
+            before, _, behind = recipe.partition("[poses]")
+            recipe = f"{before}[[tools]]{behind.partition('[[tools]]')[2]}"
+        (self.folder / "needle.toml").write_text(recipe)
         self.start()
         return self
 
@@ -108,15 +121,14 @@ class RealCell:
         return {"x": seen.dx_mm, "y": seen.dy_mm, "z": seen.dz_mm}
 
 
-class Relay:
-    """Passes bytes between the panel's jobs and the robot, and notes when a stop goes by.
+class Proxy:
+    """Passes bytes between whoever connects to :attr:`port` and a far end.
 
     Attributes:
-        aborts: When ``$Abort`` went by, monotonic.
+        port: Where it listens, on loopback.
     """
 
-    def __init__(self, far_port):
-        self._far_port, self.aborts = far_port, []
+    def __init__(self):
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
         threading.Thread(target=self._accept, daemon=True).start()
@@ -125,6 +137,13 @@ class Relay:
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
+
+    def far_end(self, near):
+        """Return the port at which the far end of a connection listens."""
+        raise NotImplementedError
+
+    def look(self, data):
+        """See bytes of the near end before they go on."""
 
     def _accept(self):
         with suppress(OSError):
@@ -136,67 +155,61 @@ class Relay:
         with (
             near,
             suppress(OSError),
-            socket.create_connection(("127.0.0.1", self._far_port)) as far,
+            socket.create_connection(("127.0.0.1", self.far_end(near))) as far,
         ):
             for end in (near, far):
                 end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            both(near, far, self._look)
+            back = threading.Thread(target=self._pass, args=(far, near, None), daemon=True)
+            back.start()
+            self._pass(near, far, self.look)
+            back.join()
 
-    def _look(self, data):
+    def _pass(self, one, other, look):
+        with suppress(OSError):
+            while data := one.recv(65536):
+                if look is not None:
+                    look(data)
+                other.sendall(data)
+        with suppress(OSError):
+            other.shutdown(socket.SHUT_WR)
+
+
+class Relay(Proxy):
+    """Stands between the panel's jobs and the robot, and notes when a stop goes by.
+
+    Attributes:
+        aborts: When ``$Abort`` went by, monotonic.
+    """
+
+    def __init__(self, far_port):
+        self._far_port, self.aborts = far_port, []
+        super().__init__()
+
+    def far_end(self, _near):
+        return self._far_port
+
+    def look(self, data):
         if b"$Abort" in data:
             self.aborts.append(time.monotonic())
 
 
-def both(near, far, look):
-    """Pass bytes both ways until both have ended; ``look`` sees those of the near end first."""
-    back = threading.Thread(target=_pass, args=(far, near, lambda _: None), daemon=True)
-    back.start()
-    _pass(near, far, look)
-    back.join()
-
-
-def _pass(one, other, look):
-    with suppress(OSError):
-        while data := one.recv(65536):
-            look(data)
-            other.sendall(data)
-    with suppress(OSError):
-        other.shutdown(socket.SHUT_WR)
-
-
-class Cable:
+class Cable(Proxy):
     """A SOCKS 5 proxy between a browser and the panel, whose cable can be pulled."""
 
     def __init__(self):
         self.out = False
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port = self._listener.getsockname()[1]
-        threading.Thread(target=self._accept, daemon=True).start()
+        super().__init__()
 
-    def close(self):
-        with suppress(OSError):
-            self._listener.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
+    def far_end(self, near):
+        self.look()
+        near.recv(262)
+        near.sendall(b"\x05\x00")
+        asked = near.recv(262)
+        self.look()
+        near.sendall(b"\x05\x00\x00\x01\x7f\x00\x00\x01" + asked[-2:])
+        return int.from_bytes(asked[-2:], "big")
 
-    def _accept(self):
-        with suppress(OSError):
-            while True:
-                near, _ = self._listener.accept()
-                threading.Thread(target=self._serve, args=(near,), daemon=True).start()
-
-    def _serve(self, near):
-        with near, suppress(OSError):
-            self._wait()
-            near.recv(262)
-            near.sendall(b"\x05\x00")
-            asked = near.recv(262)
-            port = int.from_bytes(asked[-2:], "big")
-            self._wait()
-            with socket.create_connection(("127.0.0.1", port)) as far:
-                near.sendall(b"\x05\x00\x00\x01\x7f\x00\x00\x01" + asked[-2:])
-                both(near, far, self._wait)
-
-    def _wait(self, _=b""):
+    def look(self, _data=b""):
         """Hold what is sent while the cable is out: it arrives late, as TCP does it."""
         while self.out:
             time.sleep(0.02)

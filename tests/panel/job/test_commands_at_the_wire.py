@@ -11,7 +11,11 @@ from robolink_cli.wizard.views.records import (
     TouchView,
     ValuesView,
 )
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.control.assist import InProcessEyes
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from tests.panel.job._tablet import Hand, at_the_wire, to_the_jog
 
@@ -22,7 +26,7 @@ def lines_of(body):
     return "\n".join(body.lines)
 
 
-def through(arguments, *, answers=None, eyes=None):
+def through(arguments, *, answers=None, eyes=None, states=None):
     """Answer whatever is asked; return the exit code, the last body, and what was shown."""
     seen = []
 
@@ -31,6 +35,8 @@ def through(arguments, *, answers=None, eyes=None):
         while True:
             body = tablet.body(BODIES)
             seen.append(body)
+            if states is not None and tablet.view.status is not None:
+                states.append(tablet.view.status.state)
             number = tablet.view.number
             match body:
                 case EndView(done=done):
@@ -100,6 +106,22 @@ def test_a_stop_is_released_at_the_wire(robot):
     assert "may the robot move again" in question.question
     assert (code, end.done) == (0, True)
     assert main.run(["-c", url, "robot", "jog", "z+1", "--yes"]) == 0
+
+
+def test_a_plc_that_was_stopped_is_released_at_the_wire(robolink_state):
+    simulator = SoftMotionSimulator(seed=3)
+    with serve_modbus_tcp(simulator, clock=ScaledClock(20)) as host:
+        assert main.run(["-c", host.url, "stop"]) == 0
+        code, _, _ = through(["-c", host.url, "robot", "release"], answers={1: "no"})
+        assert (code, simulator.plc.group.state) == (9, SmcGroupState.STOPPING)
+        states = list[str]()
+        code, end, seen = through(["-c", host.url, "robot", "release"], states=states)
+        question = next(one for one in seen if isinstance(one, QuestionView))
+        assert "holds the axis group" in " ".join(question.told)
+        assert (code, end.done) == (0, True)
+        assert simulator.plc.group.state is SmcGroupState.STANDBY
+        assert states[-1] == "ready", "its last screen shows how it was before"
+        assert main.run(["-c", host.url, "robot", "jog", "z+1", "--yes"]) == 0
 
 
 def test_a_reset_asks_at_the_wire(robot):

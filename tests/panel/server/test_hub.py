@@ -3,24 +3,36 @@
 import asyncio
 import math
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from robolink_cli.panel import hub as hub_module
 from robolink_cli.panel.app import Panel
-from robolink_cli.panel.board import PanelCell, may_begin
+from robolink_cli.panel.board import Board, PanelCell, may_begin
+from robolink_cli.panel.cards import CellCard
 from robolink_cli.panel.guard.pairing import Tablet as SeatedTablet
 from robolink_cli.panel.guard.seat import SILENCE_S, Seats
 from robolink_cli.panel.hub import BEAT_S, Hub, LivePage
 from robolink_cli.panel.jobs import KINDS, JobEnd, PanelJob
-from robolink_cli.panel.pages import Pages, Parts, Watcher
+from robolink_cli.panel.pages import HERE, Pages, Parts, Watcher
 from robolink_cli.panel.record import Standing
 from robolink_cli.panel.watch import CellLook, CellWatch, card_of
-from robolink_cli.wizard.views.records import Head, QuestionView, Status, View
+from robolink_cli.panel.words import speaking_in
+from robolink_cli.wizard.views.records import (
+    Head,
+    JogPad,
+    MovingView,
+    QuestionView,
+    Status,
+    TouchView,
+    View,
+)
 from starlette.websockets import WebSocketDisconnect
 
 from robolink.model import Marker, MarkerKind
+from robolink.stopping import StopNote
 from tests.panel.access._bare import Clock
 
 CELL = PanelCell("line3", "epson+tcp://192.0.2.1:5000")
@@ -32,11 +44,11 @@ class FewPages(Pages):
     def __init__(self):
         self.drawn = 0
 
-    def screen(self, view, watcher):
+    def screen(self, view, watcher, *, camera=None):
         self.drawn += 1
         return Parts("question", view.head.title, view.body.question, watcher.language)
 
-    def idle(self, card, watcher):
+    def idle(self, card, watcher, *, camera=None):
         self.drawn += 1
         return Parts("idle", card.name, card.word, watcher.language)
 
@@ -326,6 +338,74 @@ def test_only_what_is_ready_and_free_is_called_so(read, mark):
     assert card(CellLook(50.0, AT, read)).mark == mark
 
 
+def test_what_went_wrong_with_a_look_is_told_in_the_language_of_the_page():
+    """The look was made for a Chinese page; another tablet speaks English."""
+    look = CellLook(50.0, AT, failed="no route", failed_here="\u4e0d\u901a", language="zh")
+    with speaking_in("zh"):
+        assert card(look).lines[0] == "\u4e0d\u901a"
+    with speaking_in("en"):
+        assert card(look).lines[0] == "no route"
+
+
+def test_a_look_is_made_in_the_language_of_who_opened_the_page(hub, monkeypatch):
+    board, asked = hub.boards["line3"], []
+
+    async def take(language):
+        asked.append(language)
+
+    monkeypatch.setattr(board.watch, "take", take)
+    for language, cell in (("en", ""), ("zh", "line3"), ("en", "line4")):
+        hub.lives.add(Tablet(cell, language + cell, language).live)
+    asyncio.run(hub._look(board))
+    hub.lives.clear()
+    asyncio.run(hub._look(board))
+    assert asked == ["zh", "en"]
+
+
+def test_a_robot_that_is_jogged_moves(monkeypatch):
+    """The seat is not taken under a finger, nor between the steps of a held key."""
+    board, now = Board(CELL, lambda _board: None, asyncio.Semaphore(1)), [100.0]
+    monkeypatch.setattr("robolink_cli.panel.jobs.time.monotonic", lambda: now[0])
+    body = TouchView((), "", (), "", (), (), JogPad((0.1,), 0.1, ()))
+    job = board.job = PanelJob("line3", KINDS["change"], language="en", who="", changed=print)
+
+    def shows(waits):
+        job.view = replace(view(1), waits=waits, body=body)
+
+    assert not board.moving, "it has shown nothing yet"
+    shows(waits=True)
+    assert not board.moving
+    shows(waits=False)
+    assert board.moving, "a step is under way"
+    shows(waits=True)
+    job.hold(1, "x+", "f")
+    now[0] += 0.9
+    assert board.moving
+    job.beat("f")
+    now[0] += 0.9
+    assert board.moving
+    job.beat("another")
+    now[0] += 0.2
+    assert not board.moving, "its finger is lost"
+    job.hold(1, "x+", "g")
+    job.release("f")
+    assert board.moving
+    job.release("g")
+    assert not board.moving
+
+
+def test_an_old_pin_is_asked_for_at_a_question_and_not_in_a_movement():
+    pages, way = Pages(), MovingView("Turning", "", (), None, None)
+    idle = CellCard("line3", "ok", "ready")
+    for young in (True, False):
+        watcher = Watcher(seat=HERE, role="operator", young=young)
+        asked = pages.screen(view(1), watcher).foot
+        assert ("15 minutes" in asked, "/login?cell=line3" in asked) == (not young, not young)
+        assert ("15 minutes" in pages.idle(idle, watcher).foot) is not young
+        moves = replace(view(1), waits=False, body=way)
+        assert "15 minutes" not in pages.screen(moves, watcher).foot
+
+
 def test_a_cell_that_does_not_answer_shows_no_old_values():
     shown = card(CellLook(50.0, AT, failed="no route"))
     assert shown.mark == "unknown"
@@ -343,6 +423,21 @@ def test_an_open_job_counts_however_ready_the_controller_is(hub):
     assert offers["change"].why_not
     board.standing = Standing()
     assert "recover" not in {one.job for one in board.offers(Watcher())}
+
+
+def test_a_release_is_offered_where_a_stop_is_on_record_or_holds_a_plc(hub):
+    board = hub.boards["line3"]
+
+    def offered():
+        return "release" in {one.job for one in board.offers(Watcher(role="operator"))}
+
+    board.watch.look = CellLook(50.0, AT, READY)
+    assert not offered()
+    board.watch.look = CellLook(50.0, AT, {**READY, "held_by_a_stop": True})
+    assert offered(), "it was stopped from another computer: no note is here"
+    board.watch.look = None
+    board.standing = Standing(stopped=StopNote("x", "mei", AT, True))
+    assert offered()
 
 
 def test_a_look_is_made_for_a_page_or_where_the_cell_file_asks_for_it():

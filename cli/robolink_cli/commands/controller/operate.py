@@ -7,6 +7,7 @@ import click
 from robolink.errors import DeclinedError, JournalError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import Act
+from robolink.transport import parse_url
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.access.warnings import note_unsettled
 from robolink_cli.console.person import person_here
@@ -15,6 +16,7 @@ from robolink_cli.console.shell_words import state_word
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import shared_options
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (
@@ -25,11 +27,23 @@ from robolink_cli.session.context import (
     stop_request,
 )
 from robolink_cli.session.motion_consent import agree_to_motion
-from robolink_cli.stopping.notes import forget_stop, own_name_of
+from robolink_cli.stopping.notes import (
+    clear_noted_stop,
+    forget_stop,
+    may_move_again,
+    note_document,
+    noted_stop,
+    own_name_of,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from robolink.controllers import SoftMotionController
     from robolink.model import Controller, Marker
+
+_PLC = "softmotion"
+"""The kind of controller on which a stop holds the axis group until it is released."""
 
 
 @click.command()
@@ -98,26 +112,69 @@ def stop(
 
 
 @click.command()
-@shared_options
+@calming_options
 def release(
+    context: CliContext,
     *,
+    dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
     """Allow movement again after a stop: shows who stopped the robot and when, and asks.
 
-    Sends nothing: a PLC stopped by robolink, and a controller in error, need 'reset'.
+    On a PLC it releases the axis group that the stop holds. It clears no error: 'reset' does.
     """
-    from robolink_cli.stopping.notes import release_stop
+    url = context.require_url()
+    found = noted_stop(url)
+    if parse_url(url).kind == _PLC:
+        held, state = _released_plc(context, noted=found is not None, dry_run=dry_run, yes=yes)
+    else:
+        held, state = False, ""
+        if found is not None and not dry_run:
+            agree(may_move_again(), yes=yes)
+    if dry_run:
+        if not held:
+            show_requests(())
+        return
+    if found is not None:
+        clear_noted_stop(url, found)
+    payload: dict[str, object] = {"released": held or found is not None, "hold_released": held}
+    emit("release", payload | {"note": note_document(found)}, lambda: _say_released(payload, state))
 
-    payload = release_stop(stop_request(), yes=yes)
-    emit(
-        "release",
-        payload,
-        lambda: say(
-            tr("Released: commands may move the robot again.")
-            if payload["released"]
-            else tr("No stop is on record here; there is nothing to release.")
-        ),
+
+def _released_plc(
+    context: CliContext, *, noted: bool, dry_run: bool, yes: bool
+) -> tuple[bool, str]:
+    """Release what a stop holds on a PLC; return whether it held, and the state afterwards."""
+    with open_controller(context, calms=True, quiet=True) as controller:
+        plc = require_softmotion(controller)
+        held = plc.condition()["held_by_a_stop"] is True
+        if dry_run:
+            if held:
+                show_requests(plc.preview(Act.RESET))
+            return held, ""
+        with plc.latch.calming(tr("release of the stop")):
+            if held:
+                note(tr("A stop holds the axis group of the PLC. Releasing it moves nothing."))
+            if held or noted:
+                agree(may_move_again(), yes=yes)
+            held = held and plc.release_hold()
+        if (desk := current_desk()) is not None:
+            desk.look()  # else its last screen shows the controller as it was before
+        return held, plc.status().state
+
+
+def _say_released(payload: "Mapping[str, object]", state: str) -> None:
+    if not payload["released"]:
+        say(tr("No stop is on record here; there is nothing to release."))
+        return
+    if state in ("", "ready"):
+        say(tr("Released: commands may move the robot again."))
+        return
+    say(
+        tr(
+            "The stop is released. The controller's state is: {state}.",
+            state=state_word(state),
+        )
     )
 
 

@@ -92,7 +92,8 @@ class Live:
             return tr("Too many commands. Nothing was done.")
         tablet = access.tablet_of(self._scope)
         action = frame.get("action")
-        young = kind != "press" or not isinstance(action, str) or action not in ANYTIME
+        # A PIN that grows old under a finger ends no movement: it is asked for at the next press.
+        young = kind in _COMMANDS and not (isinstance(action, str) and action in ANYTIME)
         if why := access.why_not(tablet, self.cell, young=young):
             return why
         if not access.seats.has(self.cell, tablet.id):

@@ -17,7 +17,7 @@ const identity = () => Array.from(crypto.getRandomValues(new Uint8Array(12)), (b
 
 // The stream. It is fresh when a whole screen, and then the clock of the server, came by it.
 let socket = null, begun = 0, ended = false, atMs = null, heard = -Infinity, shown = false, fresh = false, silent = live, tries = 0;
-let number = Number(data.number), token = data.token, server = "", readAt = null, lived = now(), heardAt = null;
+let number = Number(data.number), token = data.token, server = "", readAt = null, lookedAt = null, lived = now(), heardAt = null;
 
 function connect() {
   const old = socket;
@@ -58,6 +58,7 @@ function hear(frame) {
     atMs = typeof frame.at_ms === "number" ? {server: frame.at_ms, now: now(), date: Date.now()} : null;
     fresh = shown;
     readAt = typeof frame.age_ms === "number" ? now() - frame.age_ms : null;
+    lookedAt = typeof frame.look_ms === "number" ? now() - frame.look_ms : null;
     if (document.visibilityState === "visible") send({t: "pong"});
   } else if (frame.t === "stopped") stopAnswered(frame);
   else if (frame.t === "refused") note(frame.why, true);
@@ -100,6 +101,17 @@ function look() {
   }
   const age = document.querySelector("[data-age]");
   if (age && readAt !== null) say(age, {s: Math.max(0, (now() - readAt) / 1000).toFixed(1)});
+  const picture = document.querySelector("[data-look]");
+  if (picture) {
+    const seconds = lookedAt === null ? Infinity : Math.max(0, (now() - lookedAt) / 1000);
+    picture.classList.toggle("old", seconds > Number(picture.dataset.old));
+    if (lookedAt !== null) {
+      const age = picture.querySelector("[data-look-age]");
+      const text = (seconds < 120 ? age.dataset.text : age.dataset.minutes)
+        .replace("{s}", seconds.toFixed(0)).replace("{m}", Math.floor(seconds / 60));
+      if (age.textContent !== text) age.textContent = text;
+    }
+  }
   if (!asleep && now() - touched > SLEEP_MS) sleep();
   place("asleep").hidden = !asleep;
   const main = place("main"), more = place("more");

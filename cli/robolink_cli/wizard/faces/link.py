@@ -18,6 +18,7 @@ from typing import Final
 from robolink_cli.console.output import visible
 from robolink_cli.wizard.happenings import Pressed
 from robolink_cli.wizard.lease import Hold, JogLease
+from robolink_cli.wizard.views.page_ways import on_a_page
 
 LONGEST_LINE: Final = 64 * 1024
 """Most bytes of a line, both ways."""
@@ -32,15 +33,24 @@ _PATIENCE_S: Final = 5.0
 _LONGEST_WORD: Final = 200
 
 
-def _visible(value: object) -> object:
-    """Return what is sent with each control character as an escape, like on a terminal."""
+_COMES_BACK: Final = frozenset({"name", "value"})
+"""Keys of what a press brings back: it is no sentence, and stays as it is."""
+
+
+def _visible(value: object, *, said: bool = True) -> object:
+    """Return what is sent: no control characters, as on a terminal, and a page's own ways.
+
+    Args:
+        value: Any part of a line.
+        said: Whether its texts are for a person.
+    """
     match value:
         case str():
-            return visible(value)
+            return on_a_page(visible(value)) if said else visible(value)
         case dict():
-            return {key: _visible(one) for key, one in value.items()}
+            return {key: _visible(one, said=key not in _COMES_BACK) for key, one in value.items()}
         case list() | tuple():
-            return [_visible(one) for one in value]
+            return [_visible(one, said=said) for one in value]
         case _:
             return value
 

@@ -1,4 +1,4 @@
-"""The rows of the catalogue, as the files in ``rows`` have them: possible faults, F01 to F80.
+"""The rows of the catalogue, as the files in ``rows`` have them: possible faults, F01 to F87.
 
 A row says what the user sees and what never happens. Tests carry its number
 (``pytest.mark.fault("F01")``); the page and the table of ``make faults`` are made from both.

@@ -1,11 +1,11 @@
 """What the contract checks found, reported whatever ends them: to people and to pipelines."""
 
 import re
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from sys import path as module_path
 from typing import TYPE_CHECKING, Final
 from xml.etree import ElementTree as Xml
 
@@ -290,8 +290,8 @@ def driver_named(name: str) -> "Callable[[], Controller]":
             tr("{name!r} is not the name of a driver.", name=name),
             remedy=tr("Write for example {example}.", example="my_package.driver:connect"),
         )
-    if str(Path.cwd()) not in module_path:
-        module_path.append(str(Path.cwd()))
+    if str(Path.cwd()) not in sys.path:
+        sys.path.append(str(Path.cwd()))
     try:
         made = getattr(import_module(module), attribute)
     except (Exception, SystemExit) as error:  # this runs third-party code

@@ -1,5 +1,6 @@
 """A person at a tablet, who does a whole change with a finger."""
 
+import os
 import time
 
 from tests.panel.browser.fingers import Fingers
@@ -7,6 +8,13 @@ from tests.panel.browser.real_cell import PINS
 from tests.panel.browser.scripted import until
 
 SIZES = (5.0, 1.0, 0.5, 0.1, 0.01)
+
+
+def pictured(page, name):
+    """Keep a picture where somebody wants to look at it."""
+    folder = os.environ.get("PANEL_PICTURES")
+    if folder:
+        page.screenshot(path=f"{folder}/{name}.png")
 
 
 class Person:

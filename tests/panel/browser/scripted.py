@@ -33,6 +33,7 @@ class ScriptedPanel:
         view: What is shown.
         watcher: Who looks.
         frozen: Whether nothing is sent or answered.
+        beats_only: Whether no screen is sent, so that a page stays as it was loaded.
         answers: What a STOP is answered with; ``None`` for nothing.
         server: The name that the server gives itself.
         documents: Further pages, by their paths.
@@ -44,6 +45,7 @@ class ScriptedPanel:
         self.frozen, self.answers, self.server = False, "stopped", "one"
         self.age_ms = 200
         self.documents = {}
+        self.beats_only = False
         self.pages = Pages()
         self.port = 0
         self._sockets = set()
@@ -169,7 +171,7 @@ class ScriptedPanel:
             if not self.frozen:
                 parts = self.parts()
                 changed = {k: v for k, v in parts.named().items() if shown.get(k) != v}
-                if changed or number != self.view.number:
+                if (changed or number != self.view.number) and not self.beats_only:
                     shown, number = parts.named(), self.view.number
                     await socket.send_json(
                         {"t": "screen", "screen": parts.screen, "number": number, "parts": changed}

@@ -1,6 +1,5 @@
 """A cell with a PLC under a finger: a whole change, a STOP, and its release on the page."""
 
-import os
 import time
 
 import pytest
@@ -8,7 +7,7 @@ from robolink_simulators.softmotion.group.condition import SmcGroupState
 
 from robolink.stopping import find_note
 from robolink.transport import far_end_of
-from tests.panel.browser.person import Person
+from tests.panel.browser.person import Person, pictured
 from tests.panel.browser.real_cell import RealCell
 from tests.panel.browser.scripted import until
 
@@ -20,13 +19,6 @@ def cell(tmp_path, monkeypatch, chromium):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     with RealCell(tmp_path, plc=True) as made:
         yield made
-
-
-def pictured(page, name):
-    """Keep a picture where somebody wants to look at it."""
-    folder = os.environ.get("PANEL_PICTURES")
-    if folder:
-        page.screenshot(path=f"{folder}/{name}.png")
 
 
 def state(cell):

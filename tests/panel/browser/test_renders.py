@@ -9,6 +9,7 @@ from robolink_cli.panel.pages import Pages, Watcher
 
 from tests.panel.browser import samples
 from tests.panel.browser.conftest import SIZES
+from tests.panel.browser.person import pictured
 from tests.panel.browser.scripted import OPERATOR
 
 pytestmark = pytest.mark.timeout(240)
@@ -94,11 +95,15 @@ def test_nothing_is_cut_small_or_over_stop(panel, screen):
         page.goto(panel.url)
         page.wait_for_selector("body:not(.silent)")
         faults[name] = look(page, size)
+        pictured(page, f"{name}-{size}-{language}")
+    panel.beats_only = True  # what is measured are these pages, not the view that follows
     for name in PAGES:
         page.goto(panel.url.replace("/cell/line3", f"/{name}"))
         if name == "history":
             page.evaluate("document.getElementById('main').dataset.long = ''")
         faults[name] = look(page, size)
+        page.evaluate("document.body.classList.remove('silent')")
+        pictured(page, f"{name}-{size}-{language}")
     assert {name: found for name, found in faults.items() if found} == {}
 
 

@@ -8,6 +8,7 @@ import json
 import os
 import platform
 import sys
+import tempfile
 
 # Before numpy is loaded: on small systems a second thread of its library only waits, and if
 # other work uses the second processor, a floor takes seven times as long as with one thread.
@@ -37,8 +38,19 @@ _PACKAGES: Final = ("numpy", "scipy", "pymodbus", "canopen", "click", "lark")
 
 
 def main() -> int:
-    """Run what was asked for; return the exit code."""
+    """Run what was asked for; return the exit code.
+
+    The records of the measured commands are gone at its end: they are nobody's, and a change that
+    was cut off with a run would forbid movements in the next.
+    """
     asked = _arguments()
+    with tempfile.TemporaryDirectory(prefix="robolink-bench-") as folder:
+        os.environ["ROBOLINK_STATE_DIR"] = folder
+        os.environ.pop("ROBOLINK_JOURNAL", None)
+        return _measure(asked)
+
+
+def _measure(asked: argparse.Namespace) -> int:
     floors, cases, seconds = Floors(), dict[str, list[Figure]](), dict[str, float]()
     floors.look()
     for name in asked.cases or CASES:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,8 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from robolink.model import Secret
 
@@ -213,3 +215,14 @@ class Cable(Proxy):
         """Hold what is sent while the cable is out: it arrives late, as TCP does it."""
         while self.out:
             time.sleep(0.02)
+
+
+@contextmanager
+def watching(cell):
+    """A tablet that watches, without a browser: it reads all that comes."""
+    place = cell.url.removeprefix("http").rstrip("/")
+    with connect(f"ws{place}/live?cell=line3", origin=Origin(f"http{place}")) as socket:
+        reads = threading.Thread(target=lambda: [None for _ in socket], daemon=True)
+        reads.start()
+        yield
+    reads.join(5)

@@ -3,17 +3,14 @@
 import re
 import signal
 import sys
-import threading
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 
 import pytest
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from tests.panel.browser.fingers import Fingers
 from tests.panel.browser.person import Person
-from tests.panel.browser.real_cell import Cable, RealCell
+from tests.panel.browser.real_cell import Cable, RealCell, watching
 from tests.panel.browser.scripted import until
 
 pytestmark = pytest.mark.timeout(240)
@@ -325,14 +322,3 @@ def test_stop_is_as_fast_with_twenty_tablets(cell, tablet):
     sys.stdout.write(f"STOP to $Abort, 20 tablets, n = 20: {figures}\n")
     assert took_ms[10] < 250
     assert took_ms[-1] < 1000
-
-
-@contextmanager
-def watching(cell):
-    """A tablet that watches, without a browser: it reads all that comes."""
-    place = cell.url.removeprefix("http").rstrip("/")
-    with connect(f"ws{place}/live?cell=line3", origin=Origin(f"http{place}")) as socket:
-        reads = threading.Thread(target=lambda: [None for _ in socket], daemon=True)
-        reads.start()
-        yield
-    reads.join(5)

@@ -232,7 +232,7 @@ class EyeCamera:
         look = self._unseen
         if look is None or look.mark != mark:
             return None
-        return miss(look.picture, look.candidates, self.identity)
+        return miss(look.picture, look.candidates, self.identity, mark=mark)
 
     def doubts(self) -> tuple[str, ...]:
         """Return ``focus_not_taught`` where that is so; see :class:`~robolink.model.NamesDoubts`.
@@ -326,7 +326,7 @@ class EyeCamera:
             return
         if not look.accepted:
             self._unseen = look
-            reason = miss(look.picture, look.candidates, self.identity)
+            reason = miss(look.picture, look.candidates, self.identity, mark=look.mark)
             self._keep(LookRole.REFUSED, look, reason.code if reason else "tip_not_seen")
         else:
             self._keep(LookRole.REFUSED, look, "several_tips_seen")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import CalibrationError
 from robolink.eye.candidate import Candidate, RefusalCode
 from robolink.messages import tr
+from robolink.model import TIP
 
 if TYPE_CHECKING:
     from robolink.eye.picture import CameraPicture, Grey
@@ -29,7 +30,7 @@ _OUT_OF_FOCUS: Final = frozenset({RefusalCode.BLURRED, RefusalCode.FAINT_EDGE})
 
 
 def miss(
-    picture: "CameraPicture", candidates: Sequence[Candidate], camera: str
+    picture: "CameraPicture", candidates: Sequence[Candidate], camera: str, *, mark: int = TIP
 ) -> CalibrationError | None:
     """Return why nothing was found in a picture, ``None`` for no known reason.
 
@@ -37,45 +38,71 @@ def miss(
         picture: The picture.
         candidates: All that was looked at in it, none of it accepted.
         camera: Which camera took it.
+        mark: What was looked for: the tip, or a fiducial by its number.
     """
     for candidate in sorted(candidates, key=lambda one: -one.score):
         codes = {refusal.code for refusal in candidate.refused}
         if RefusalCode.BLURRED in codes and codes <= _OUT_OF_FOCUS:
-            return _out_of_focus(candidate)
+            return _out_of_focus(candidate, mark)
         if RefusalCode.CUT in codes:
-            return _cut(candidate)
+            return _cut(candidate, mark)
     return light_refusal(picture.grey, camera)
 
 
-def _out_of_focus(candidate: Candidate) -> CalibrationError:
+def _out_of_focus(candidate: Candidate, mark: int) -> CalibrationError:
     (blurred,) = (one for one in candidate.refused if one.code is RefusalCode.BLURRED)
+    if mark == TIP:
+        return CalibrationError(
+            "out_of_focus",
+            tr(
+                "The tip is out of focus: its edge is {edge:.1f} px wide, limit {limit:.1f} px.",
+                edge=blurred.measured,
+                limit=blurred.limit,
+            ),
+            remedy=tr(
+                "Check the length of the tip (Z), the height of the station and the lens; "
+                "'robolink eye look' shows the focus."
+            ),
+        )
     return CalibrationError(
         "out_of_focus",
         tr(
-            "The tip is out of focus: its edge is {edge:.1f} px wide, limit {limit:.1f} px.",
+            "Fiducial {mark} is out of focus: its edge is {edge:.1f} px wide, limit {limit:.1f} "
+            "px.",
+            mark=mark,
             edge=blurred.measured,
             limit=blurred.limit,
         ),
-        remedy=tr(
-            "Check the length of the tip (Z), the height of the station and the lens; "
-            "'robolink eye look' shows the focus."
-        ),
+        remedy=tr("Check how high the board is held, the height of the station and the lens."),
     )
 
 
-def _cut(candidate: Candidate) -> CalibrationError:
+def _cut(candidate: Candidate, mark: int) -> CalibrationError:
+    place = {"x": candidate.x_px, "y": candidate.y_px, "radius": candidate.radius_px}
+    if mark == TIP:
+        return CalibrationError(
+            "tip_cut",
+            tr(
+                "The tip is not wholly in the picture: it is at ({x:.0f}, {y:.0f}), radius "
+                "{radius:.0f} px.",
+                **place,
+            ),
+            remedy=tr(
+                "Check where the camera looks, and the stored offset of the tool; use a larger "
+                "field of view."
+            ),
+        )
     return CalibrationError(
         "tip_cut",
         tr(
-            "The tip is not wholly in the picture: it is at ({x:.0f}, {y:.0f}), radius "
+            "Fiducial {mark} is not wholly in the picture: it is at ({x:.0f}, {y:.0f}), radius "
             "{radius:.0f} px.",
-            x=candidate.x_px,
-            y=candidate.y_px,
-            radius=candidate.radius_px,
+            mark=mark,
+            **place,
         ),
         remedy=tr(
-            "Check where the camera looks, and the stored offset of the tool; use a larger "
-            "field of view."
+            "Check where the camera looks, the drawing, and that the board is held as drawn; use a "
+            "larger field of view."
         ),
     )
 

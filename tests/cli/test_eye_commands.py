@@ -9,12 +9,14 @@ import pytest
 from PIL import Image
 from robolink_cli import main
 from robolink_cli.commands.measure.eye import watch as watching
+from robolink_cli.commands.measure.eye.look import MOST_LISTED
 from robolink_cli.commands.measure.eye.watch import Focus, watch_line
 
 from robolink.eye.candidate import Candidate, CandidateRefusal, RefusalCode
 from robolink.eye.record.collection import read_collection
 from robolink.eye.record.png import png_of
 from tests.eye._drawn_tips import SIZE_PX, drawn_tip
+from tests.eye.drawings import drawing
 
 
 @pytest.fixture(autouse=True)
@@ -74,6 +76,22 @@ def test_the_document_has_each_candidate_with_its_reasons(robolink, tip_picture,
     assert text.count("<circle") > len(document["candidates"])
     assert "data:image/png;base64," in text
     assert "<script" not in text
+
+
+def test_the_best_few_are_listed_and_all_where_they_are_asked_for(robolink, tmp_path):
+    """Without a radius every size is looked for, and most of what is found is refused."""
+    (tmp_path / "screws.png").write_bytes(png_of(drawing(24, SIZE_PX).grey))
+    words = ("eye", "look", "--picture", str(tmp_path / "screws.png"))
+    everything = json.loads(robolink(*words, "--json")[1])["candidates"]
+    accepted = sum(not one["refused"] for one in everything)
+    listed = max(MOST_LISTED, accepted)
+    assert len(everything) > listed + 1
+    lines = robolink(*words)[1].splitlines()
+    assert [line.split(":")[0] for line in lines[:listed]] == [
+        str(number) for number in range(1, listed + 1)
+    ]
+    assert lines[listed] == f"{len(everything) - listed} more were refused: --all lists them."
+    assert len(robolink(*words, "--all")[1].splitlines()) == len(everything) + 1
 
 
 def test_no_tip_is_exit_code_1_and_says_why(robolink, empty_picture):

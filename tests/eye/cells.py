@@ -17,6 +17,8 @@ from robolink_simulators.pictures.server import PictureServer
 from robolink_simulators.pictures.source import DrawnPictures
 
 from robolink.calibration import BoardDrawing
+from robolink.errors import CalibrationError
+from robolink.eye.cameras.gige.opening import open_gige
 from robolink.eye.candidate import TipShape
 from robolink.eye.eye_camera import EyeCamera
 from robolink.eye.opening import open_source
@@ -31,12 +33,17 @@ from robolink.methods import (
 from tests.certificate.live import Course, held_board
 from tests.contract._camera_cell import camera_station, furnish
 from tests.contract._sensor_cell import plc_sensor_cell, sensor_cell
+from tests.eye.gige.conftest import alone
 from tests.unit._drawn_cells import cell_before_camera
 
 KINDS: Final = {"EPSON": sensor_cell, "PLC": plc_sensor_cell}
 METHODS: Final = ("camera", "camera-affine", "board", "runout-table")
 
 SIZE_PX: Final = (640, 512)
+
+GIGE_ADDRESS: Final = "127.0.0.1"
+PORT_PATIENCE_S: Final = 3600.0
+PICTURE_PATIENCE_S: Final = 30.0
 
 
 @contextmanager
@@ -57,13 +64,14 @@ def over_http(cell: Any, ending: str = "pgm") -> Iterator[Callable[[], Any]]:
 def over_gige(cell: Any) -> Iterator[Callable[[], Any]]:
     """Serve them as a GigE camera on loopback, by the library Aravis.
 
-    Its port cannot be chosen, so whoever uses this has to be :func:`alone`.
+    Its port cannot be chosen: who comes second waits until the first has changed its nozzle. The
+    time of the camera is real, and on a busy computer a picture is drawn for seconds.
     """
     from robolink_simulators.pictures.gige_camera import drawn_gige_camera
 
     drawn = DrawnCamera(cell.simulator)
-    with drawn_gige_camera(drawn, "127.0.0.1") as camera:
-        yield lambda: open_source(camera.url)
+    with alone(PORT_PATIENCE_S), drawn_gige_camera(drawn, GIGE_ADDRESS):
+        yield lambda: open_gige(GIGE_ADDRESS, patience_s=PICTURE_PATIENCE_S)
 
 
 WAYS: Final[Mapping[str, Callable[..., Any]]] = {
@@ -81,6 +89,9 @@ def taught(kind: str, seed: int, world: Mapping[str, Any]) -> dict[str, object]:
         kind: The kind of controller.
         seed: Of the cell.
         world: Parameters of its world.
+
+    Raises:
+        CalibrationError: ``tip_not_seen``: not exactly one tip is found, so nobody can teach it.
     """
     before = {"EPSON": "epson", "PLC": "softmotion"}[kind]
     simulator = cell_before_camera(before, seed, **{**world, "board_held": False})
@@ -89,7 +100,10 @@ def taught(kind: str, seed: int, world: Mapping[str, Any]) -> dict[str, object]:
     um_per_px = math.sqrt(parameters.camera_um_per_px_x * parameters.camera_um_per_px_y)
     stated_px = parameters.tip_diameter_mm / 2 * 1000 / um_per_px
     shape = TipShape(stated_px, bore=bool(parameters.tip_bore_mm))
-    (tip,) = (one for one in find_tips(DrawnCamera(simulator).grey(), shape) if one.accepted)
+    found = [one for one in find_tips(DrawnCamera(simulator).grey(), shape) if one.accepted]
+    if len(found) != 1:
+        raise CalibrationError("tip_not_seen", f"{len(found)} tips", remedy="change the light")
+    (tip,) = found
     return {
         "station": "CAM-01",
         "diameter_mm": parameters.tip_diameter_mm,

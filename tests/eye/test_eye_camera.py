@@ -203,6 +203,16 @@ def test_the_best_candidate_says_why_nothing_was_seen(candidates, code):
     assert refusal(lambda: seen_in(eye, TIP, pictures=3)).code == code
 
 
+@pytest.mark.parametrize("code", [RefusalCode.CUT, RefusalCode.BLURRED])
+def test_what_is_missed_is_named_as_what_was_looked_for(code):
+    eye = camera(noise(40, 200), found=answering([refused(code)]))
+    tip, fiducial = (refusal(lambda mark=mark: seen_in(eye, mark, pictures=3)) for mark in (TIP, 2))
+    assert tip.code == fiducial.code
+    assert tip.what.startswith("The tip is ")
+    assert fiducial.what.startswith("Fiducial 2 is ")
+    assert "tip" not in (fiducial.what + fiducial.remedy).lower()
+
+
 def test_no_reason_is_left_over_from_an_earlier_look():
     eye = camera(found=answering(*[[refused(RefusalCode.CUT)]] * 3, [ONE]))
     assert refusal(lambda: seen_in(eye, TIP, pictures=3)).code == "tip_cut"

@@ -1,16 +1,24 @@
 """What goes wrong with pictures ends each method by its own name, with nothing written."""
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, Final
 
 import pytest
+from robolink_simulators.pictures.camera import DrawnCamera
+from robolink_simulators.pictures.source import DrawnPictures
 
-from tests.certificate.live import Ended, change
-from tests.eye.cells import METHODS, course, fault
+from robolink.eye.eye_camera import EyeCamera
+from tests.certificate.live import Course, Ended, change
+from tests.eye.cells import METHODS, camera, course, fault
 from tests.eye.picture_faults import CODES, fault_of
 
 SEED = 5
 LIFTED_MM = 1.5
 """By how much at least a tool that is lifted is above the plane of focus."""
+
+LATE_S: Final = 0.8
+FRAME_S: Final = 0.05
+"""How late a stream is, and how long from one of its frames to the next."""
 
 
 def ended(method: str, kind: str, name: str, *, from_write: bool = False) -> tuple[Ended, Any]:
@@ -129,6 +137,41 @@ def test_f86_a_second_nozzle_is_one_too_many(method, kind):
 @each()
 def test_f87_what_is_out_of_focus_is_told(method, kind):
     require_refused(method, kind, "1 mm out of focus")
+
+
+def late_stream(taught_s: float) -> Course:
+    """Return a nozzle change by a stream that goes on while the robot waits, its delay taught."""
+
+    def source(cell: Any, rng: Any) -> Any:
+        drawn, advance = DrawnCamera(cell.simulator), cell.clock.advance
+
+        def frame_by_frame(seconds: float) -> None:
+            while seconds > 0:
+                advance(min(FRAME_S, seconds))
+                drawn.note()
+                seconds -= FRAME_S
+
+        cell.clock.advance = frame_by_frame
+        cell.eye = lambda: EyeCamera(DrawnPictures(drawn, clock=cell.clock), clock=cell.clock)
+        cell.details = {**cell.details, "lag_s": taught_s}
+        return camera(cell, rng)
+
+    return replace(course("camera", "EPSON"), source=source)
+
+
+@pytest.mark.soak
+@pytest.mark.fault("F84")
+@pytest.mark.timeout(300)
+def test_f84_a_delay_that_was_taught_is_waited_for_and_one_that_was_not_is_refused():
+    def late(cell: Any) -> None:
+        fault(cell, picture_late_s=LATE_S)
+
+    taught = change(late_stream(LATE_S + FRAME_S), SEED, wrong=late)
+    assert taught.good
+    assert taught.share < 0.8
+    untaught = change(late_stream(0.0), SEED, wrong=late)
+    assert untaught.code == "stale_picture"
+    assert untaught.proposal is None
 
 
 @pytest.mark.soak

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from robolink.eye.candidate import Polarity, RefusalCode, TipShape
 from robolink.eye.tip_finder import find_tips
-from robolink.eye.tip_finder.circles import _lobes
+from robolink.eye.tip_finder.circles import Circle, _lobes
+from robolink.eye.tip_finder.own_profile import on_one_axis
 from robolink.eye.tip_finder.rays import RAYS, Edges
-from tests.eye.drawings import KINDS, blurred, drawing
+from tests.eye.drawings import KINDS, Canvas, Face, blurred, drawing, face, taken
 
 SIZE = (400, 300)
 FIRST_OF_KIND = sorted({KINDS.index(kind) for kind in KINDS})
@@ -160,6 +161,43 @@ def test_the_outline_of_a_chamfered_face_is_its_outer_edge():
     assert abs(found[0].x_px - 101.3) < 0.1
     assert abs(found[0].radius_px - 30.0) < 0.4
     assert not any(one.accepted for one in found[1:])
+
+
+def worn_errors_px(aside, count):
+    """Return how far the places of worn tips are off, one each."""
+    found = []
+    for seed in range(count):
+        canvas = Canvas.blank(seed, SIZE)
+        canvas.grey += 40
+        how = Face(180.0, 15.0, 0.45, jag=0.03, grain=12.0, aside=aside)
+        truth = face(canvas, 200.0, 150.0, 50.0, how)
+        (one,) = accepted(taken(canvas, 1.0, 2.0), TipShape(48.0))
+        found.append(math.hypot(one.x_px - truth.x_px, one.y_px - truth.y_px))
+    return np.array(found)
+
+
+def test_a_rough_rim_is_drawn_to_a_bore_on_its_axis_and_not_to_an_eccentric_one():
+    on_axis, eccentric = worn_errors_px(0.0, 8), worn_errors_px(0.08, 4)
+    assert np.sqrt(np.mean(on_axis**2)) < 0.52
+    assert np.sqrt(np.mean(eccentric**2)) < 0.8
+    assert eccentric.max() < 1.2
+
+
+def test_two_rough_circles_share_an_axis_only_as_far_as_their_scatter_says():
+    rim = Circle(100.0, 100.0, 50.0, 1, 1.0, 1.0, 0.0, 0.0)
+
+    def drawn_px(off_px, of=rim):
+        bore = Circle(100.0 + off_px, 100.0, 22.0, -1, 1.0, 0.5, 0.0, 0.0)
+        x_px, y_px = on_one_axis((100.0, 100.0), of, bore)
+        assert y_px == 100.0
+        return x_px - 100.0
+
+    assert 0.25 < drawn_px(0.5) < 0.4
+    assert drawn_px(4.0) == 0.0
+    steps = np.diff([drawn_px(off_px) for off_px in np.arange(0.0, 4.0, 0.05)])
+    assert np.abs(steps).max() < 0.05  # it never jumps
+    assert abs(drawn_px(0.5, rim._replace(rms_px=0.05))) < 0.01
+    assert on_one_axis((100.0, 100.0), rim, None) == (100.0, 100.0)
 
 
 def test_another_size_is_not_taken():

@@ -51,9 +51,21 @@ def require_known_ending(path: Path) -> None:
         )
 
 
-def look_lines(candidates: Sequence[Candidate]) -> list[str]:
-    """Return what was found, a line each, and what it comes to."""
+def look_lines(candidates: Sequence[Candidate], *, most: int | None = None) -> list[str]:
+    """Return what was found, a line each, and what it comes to.
+
+    Args:
+        candidates: What was found, the accepted ones first.
+        most: How many have a line; the accepted ones have one in any case.
+    """
     lines = [candidate_line(number, one) for number, one in enumerate(candidates, start=1)]
+    if most is not None:
+        listed = max(most, sum(one.accepted for one in candidates))
+        if left := len(lines[listed:]):
+            lines = [
+                *lines[:listed],
+                tr("{count} more were refused: --all lists them.", count=left),
+            ]
     return [*lines, candidates_summary(candidates)]
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from robolink.eye.candidate import Candidate, CandidateRefusal, RefusalCode, TipShape
 from robolink.eye.tip_finder.circles import Circle, circles
-from robolink.eye.tip_finder.own_profile import centred_by_profile
+from robolink.eye.tip_finder.own_profile import MOST_MOVED, centred_by_profile, on_one_axis
 from robolink.eye.tip_finder.rays import (
     COS,
     SIN,
@@ -116,20 +116,21 @@ class Bore(NamedTuple):
     """The edge of a hole inside of a circle.
 
     Attributes:
-        radius_px: Its radius.
+        circle: Its edge.
         share: Share of the rays that met it.
         ratio: Its radius as a share of the circle's.
         aside: How far its middle is from the circle's, as a share of the circle's radius.
-        oval: How far it is from round, as a share of its own radius.
-        roughness: How far its edges scatter, as a share of its own radius.
     """
 
-    radius_px: float
+    circle: Circle
     share: float
     ratio: float
     aside: float
-    oval: float
-    roughness: float
+
+    @property
+    def roughness(self) -> float:
+        """Return how far its edges scatter, as a share of its own radius."""
+        return self.circle.rms_px / self.circle.radius_px
 
 
 def scene_of(grey: Grey, shape: TipShape, radius_px: float) -> Scene:
@@ -182,7 +183,12 @@ def judged(scene: Scene, circle: Circle) -> Candidate:
         refused.append(CandidateRefusal(RefusalCode.POOR_FIT, score, LEAST_SCORE))
     x, y = circle.x_px, circle.y_px
     if not refused and rough:
-        x, y = centred_by_profile(scene.grey, circle) or (x, y)
+        middle = centred_by_profile(scene.grey, circle, width)
+        moved = math.hypot(middle[0] - x, middle[1] - y) / radius
+        if moved > MOST_MOVED:  # the picture about it is not round
+            refused.append(CandidateRefusal(RefusalCode.POOR_FIT, moved, MOST_MOVED))
+        else:
+            x, y = on_one_axis(middle, circle, bore.circle if bore else None)
     return Candidate(
         x, y, radius, score, share, width, bore.ratio if bore else None, tuple(refused)
     )
@@ -221,9 +227,9 @@ def _faults_of_the_bore(shape: TipShape, bore: Bore | None) -> list[CandidateRef
         return [CandidateRefusal(RefusalCode.NO_BORE, bore.share if bore else 0.0, LEAST_BORE_RAYS)]
     if bore.aside > MOST_ASIDE:
         return [CandidateRefusal(RefusalCode.BORE_ASIDE, bore.aside, MOST_ASIDE)]
-    if bore.oval > MOST_OVAL_BORE:
-        return [CandidateRefusal(RefusalCode.NOT_ROUND, bore.oval, MOST_OVAL_BORE)]
-    roughest = ROUGHEST_BORE[0] + ROUGHEST_BORE[1] / bore.radius_px
+    if bore.circle.oval > MOST_OVAL_BORE:
+        return [CandidateRefusal(RefusalCode.NOT_ROUND, bore.circle.oval, MOST_OVAL_BORE)]
+    roughest = ROUGHEST_BORE[0] + ROUGHEST_BORE[1] / bore.circle.radius_px
     if bore.roughness > roughest:
         return [CandidateRefusal(RefusalCode.NOT_ROUND, bore.roughness, roughest)]
     low, high = _bores(shape)
@@ -320,14 +326,7 @@ def _bore(scene: Scene, circle: Circle) -> Bore | None:
     hole = found[0]
     _, agreeing = _step(scene, hole, reach=0.3, gap=0.06, least_px=2.0)
     aside = math.hypot(hole.x_px - circle.x_px, hole.y_px - circle.y_px)
-    return Bore(
-        hole.radius_px,
-        min(hole.share, agreeing),
-        hole.radius_px / radius,
-        aside / radius,
-        hole.oval,
-        hole.rms_px / hole.radius_px,
-    )
+    return Bore(hole, min(hole.share, agreeing), hole.radius_px / radius, aside / radius)
 
 
 def _step(

@@ -31,6 +31,9 @@ def look(
         ),
     ] = None,
     force: Overwrite = False,
+    every: Annotated[
+        bool, CliOption("--all", help="List every circle that was refused, not the best few only.")
+    ] = False,
     watch: Annotated[
         bool, CliOption(help="Take pictures until Ctrl-C, a line for each: for focusing.")
     ] = False,
@@ -42,8 +45,9 @@ def look(
 ) -> int:
     """Take one picture and show everything that is found in it.
 
-    Every candidate is listed with its place, radius and edge width, and why it was refused.
-    Exit code 1 where not exactly one tip is accepted.
+    The best candidates are listed with place, radius and edge width, and why each was refused;
+    --all, --json and the page of --out have all of them. Exit code 1 where not exactly one tip is
+    accepted.
     """
     from robolink_cli.commands.measure.eye.look import look_once
     from robolink_cli.commands.measure.eye.watch import watch_on
@@ -54,7 +58,7 @@ def look(
         if out is not None:
             raise click.UsageError(tr("--watch writes no file: leave out --out."))
         return watch_on(context, which, count)
-    return look_once(context, which, out, force=force)
+    return look_once(context, which, out, force=force, every=every)
 
 
 @eye.command("collect", short_help="Save a picture with its truth marked by hand, for tests.")

@@ -1,6 +1,7 @@
 """eye look: one picture, everything that was found in it, and why something was refused."""
 
 from pathlib import Path
+from typing import Final
 
 from robolink.files.named import require_free
 from robolink.messages import tr
@@ -12,8 +13,13 @@ from robolink_cli.console.render import emit, note, say
 from robolink_cli.session.context import CliContext
 from robolink_cli.views.eye import look_lines, look_payload, require_known_ending, save_look
 
+MOST_LISTED: Final = 6
+"""Candidates that are listed unless all are asked for; all accepted ones are in any case."""
 
-def look_once(context: CliContext, which: EyeOptions, out: Path | None, *, force: bool) -> int:
+
+def look_once(
+    context: CliContext, which: EyeOptions, out: Path | None, *, force: bool, every: bool
+) -> int:
     """Take a picture, show what is found, write it if wanted; return the exit code.
 
     Raises:
@@ -35,7 +41,7 @@ def look_once(context: CliContext, which: EyeOptions, out: Path | None, *, force
     payload |= {"station": view.station or None, "file": None if out is None else str(out)}
 
     def show() -> None:
-        for line in look_lines(candidates):
+        for line in look_lines(candidates, most=None if every else MOST_LISTED):
             say(line)
 
     emit("eye-look", payload, show)

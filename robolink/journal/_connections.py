@@ -26,7 +26,9 @@ and a place must not be opened twice."""
 _in_memory: Final[dict[str, "Journal"]] = {}
 
 
-def open_journal(location: str | None = None, *, read_only: bool = False) -> "Journal":
+def open_journal(
+    location: str | None = None, *, address: str = "", read_only: bool = False
+) -> "Journal":
     """Open a journal, or return the one that this process has open.
 
     A new file is for its owner only, and so is a new folder.
@@ -34,13 +36,21 @@ def open_journal(location: str | None = None, *, read_only: bool = False) -> "Jo
     Args:
         location: Path, ``sqlite:///`` URL or PostgreSQL URL; by default
             :func:`default_location`.
+        address: How the controller is reached that it is about, where no location is given.
         read_only: Whether nothing will be added. That also works where nothing can be, and
             for a journal that a newer robolink made.
 
     Raises:
         JournalError: It cannot be opened.
+
+    Example:
+        >>> from robolink.journal import close_files, open_journal
+        >>> journal = open_journal("open-example.db")
+        >>> journal.count(), open_journal("open-example.db") is journal
+        (0, True)
+        >>> close_files()
     """
-    place = place_of(location or default_location())
+    place = place_of(location or default_location(address))
     key = (place.url or place.location, read_only)
     with _lock:
         known = _opened.get(key)
@@ -100,8 +110,9 @@ def open_log(
         return memory_journal(address).log(address, signature=signature)
 
     def record() -> OutcomeLog:
-        journal = open_journal()
+        journal = open_journal(address=address)
         journal.require_usable()  # a journal opened earlier may have been damaged since
+        journal.require_unmoved(address)
         return journal.log(address, signature=signature)
 
     trouble = None
@@ -114,7 +125,9 @@ def open_log(
         address,
         signature=signature,
         record=record,
-        read=lambda: open_journal(read_only=True).log(address, signature=signature),
+        read=lambda: open_journal(address=address, read_only=True).log(
+            address, signature=signature
+        ),
         in_order=lambda: nothing_is_open(address),
         trouble=trouble,
     )
@@ -137,7 +150,9 @@ def nothing_is_open(address: str) -> bool:
     Returns:
         False also where that cannot be told; a server is not asked.
     """
-    return _asked(lambda tables, location: tables.in_order(address, location), unknown=False)
+    return _asked(
+        address, lambda tables, location: tables.in_order(address, location), unknown=False
+    )
 
 
 class NamesOnRecord(NamedTuple):
@@ -163,6 +178,7 @@ def names_on_record(address: str) -> NamesOnRecord:
     """
     nobody: tuple[tuple[int | None, str], ...] = ()
     rows = _asked(
+        address,
         lambda tables, _: tables.entries.subjects(tables.names.all_of(address) if address else ()),
         unknown=nobody,
     )
@@ -172,13 +188,13 @@ def names_on_record(address: str) -> NamesOnRecord:
     )
 
 
-def _asked(question: "Callable[[Tables, str], T]", *, unknown: T) -> T:
+def _asked(address: str, question: "Callable[[Tables, str], T]", *, unknown: T) -> T:
     """Ask this user's journal if it is a file; a damaged or missing one returns nothing.
 
     The file is opened for the question alone: the next one may be about another file.
     """
     try:
-        place = place_of(default_location())
+        place = place_of(default_location(address))
         if place.path is None or not place.path.exists():
             return unknown
         from robolink.journal.store.store import Store
@@ -197,6 +213,22 @@ def close_files() -> None:
                 journal.close()
                 _closed[key] = journal
                 _opened.pop(key, None)
+
+
+def journals_in_use() -> "tuple[Journal, ...]":
+    """Return the journals that this process has open and that outlive it, each once."""
+    with _lock:
+        return tuple({one.location: one for one in _opened.values() if one.durable}.values())
+
+
+def journals_added_to() -> "tuple[Journal, ...]":
+    """Return the journals to which this process added entries since this was asked last.
+
+    Those in memory are left out: nothing outlives them.
+    """
+    with _lock:
+        journals = {id(one): one for one in (*_opened.values(), *_closed.values()) if one.durable}
+    return tuple([journal for journal in journals.values() if journal.take_grown()])
 
 
 def _open(place: JournalPlace, *, read_only: bool) -> "Journal":

@@ -1,20 +1,23 @@
 """The journal of all controllers."""
 
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from robolink.errors import JournalError
-from robolink.journal._lease_view import LeaseHolder
+from robolink.journal._lease_view import FREE, LeaseHolder, LeaseView
 from robolink.journal._outcome_log import JournalOutcomeLog
 from robolink.journal.store.chain import ChainCheck
+from robolink.journal.store.check_rows import ClosedDay, problems_of_days
 from robolink.journal.store.entry_rows import ChainVerification, Filter
+from robolink.journal.store.migrations import unknown_fields_error
 from robolink.messages import tr
-from robolink.model import EntryKind, Marker, Recorded, Signature
+from robolink.model import EntryKind, Marker, NewCheck, Recorded, RecordedCheck, Signature
 from robolink.timing import Clock
 
 if TYPE_CHECKING:
+    from robolink.journal._outbox import JournalOutbox
     from robolink.journal.store.store import Store
 
 PAGE: Final = 500
@@ -48,6 +51,23 @@ class Journal:
     def durable(self) -> bool:
         """Whether it outlives this process."""
         return self._store.durable
+
+    def require_unmoved(self, controller: str | None = None) -> None:
+        """Make sure that a record was not moved to another journal.
+
+        Args:
+            controller: Whose: its identity, an address at which it was met, or a former name. By
+                default the whole journal.
+
+        Raises:
+            JournalError: It was, and says where; or it cannot be read.
+        """
+        with self._store.read() as tables:
+            move = tables.moved(() if controller is None else tables.names.all_of(controller))
+        if move is not None:
+            from robolink.journal.store.seal import moved_error, shown
+
+            raise moved_error(move, shown(self.location))
 
     def require_usable(self) -> None:
         """Make sure that it can be opened as it is now.
@@ -142,6 +162,76 @@ class Journal:
         """
         return next(self.entries(after=number - 1, before=number + 1), None)
 
+    def record_checks(
+        self,
+        checks: Sequence[NewCheck],
+        *,
+        signature: Signature | None = None,
+        keep_days: int | None = None,
+    ) -> None:
+        """Record checks of cells, in one durable transaction, outside the chain.
+
+        With the first check of another day, the day before becomes one entry of the chain, and
+        days that are kept no longer are deleted.
+
+        Args:
+            checks: What was found.
+            signature: Who checked, and with what.
+            keep_days: For how many days checks are kept; by default none is deleted.
+
+        Raises:
+            JournalError: They are not stored.
+
+        Example:
+            >>> from robolink.journal import memory_journal
+            >>> from robolink.model import NewCheck
+            >>> journal = memory_journal("checks-example")
+            >>> found = NewCheck("epson:C-1/R-1", "line3", True, "No problem found.")
+            >>> journal.record_checks([found], keep_days=30)
+            >>> [(one.number, one.cell) for one in journal.checks()]
+            [(1, 'line3')]
+        """
+        if checks:
+            with self._store.write() as tables:
+                tables.checks.append(signature or Signature(), checks, keep_days=keep_days)
+
+    def checks(
+        self,
+        *,
+        controller: str | None = None,
+        limit: int | None = None,
+        newest_first: bool = True,
+    ) -> Iterator[RecordedCheck]:
+        """Yield the checks that are kept, read page by page.
+
+        Args:
+            controller: Of this controller only: its identity, or an address at which it was met.
+            limit: At most so many.
+            newest_first: In which order.
+
+        Raises:
+            JournalError: It cannot be read.
+
+        Example:
+            >>> from robolink.journal import memory_journal
+            >>> journal = memory_journal("no-checks-example")
+            >>> list(journal.checks(controller="epson:C-1/R-1", limit=1))
+            []
+        """
+        names = () if controller is None else (*self.names_of(controller), controller)
+        bounds: dict[str, int | None] = {"before": None, "after": None}
+        while limit is None or limit > 0:
+            size = PAGE if limit is None else min(PAGE, limit)
+            with self._store.read() as tables:
+                page = tables.checks.page(
+                    tuple(dict.fromkeys(names)), **bounds, limit=size, newest_first=newest_first
+                )
+            yield from map(_check, page)
+            if len(page) < size:
+                return
+            bounds["before" if newest_first else "after"] = page[-1]["number"]
+            limit = None if limit is None else limit - size
+
     def last_value(self, controller: str, tool: int) -> Recorded | None:
         """Return the newest entry that proves what a tool holds, in its ``details["value"]``.
 
@@ -155,7 +245,7 @@ class Journal:
         return None
 
     def verify(self, progress: Callable[[int, int], None] | None = None) -> ChainVerification:
-        """Check that no entry was changed and none is missing.
+        """Check that no entry was changed and none is missing, nor any check that is kept.
 
         Args:
             progress: Called now and then with how many were checked, and of how many.
@@ -166,7 +256,7 @@ class Journal:
         # Everything added from here on comes after both.
         with self._store.read() as tables:
             if tables.newer:
-                raise _too_new(self.location)
+                raise unknown_fields_error(self.location)
             last, head = tables.entries.settled(tables.entries.last_number)
         check = ChainCheck()
         problems: list[str] = []
@@ -176,7 +266,46 @@ class Journal:
             if progress is not None:
                 progress(check.checked, max(last, check.checked))
         problems += check.problems_at_end(head)
+        problems += self._problems_of_checks()
         return ChainVerification(check.checked, tuple(problems), check.number, check.hash)
+
+    def _problems_of_checks(self) -> list[str]:
+        """Compare the checks on record with what the chain says of their days, at one instant."""
+        with self._store.read() as tables:
+            tables.connection.run(tables.connection.begin_snapshot)
+            kinds = Filter(kinds=(EntryKind.CHECK_DAY,), newest_first=False)
+            days: list[ClosedDay] = []
+            after = 0
+            while True:
+                page = tables.entries.page(kinds, before=None, after=after, limit=PAGE)
+                days += filter(None, (ClosedDay.of(_details(row["details"])) for row in page))
+                if len(page) < PAGE:
+                    break
+                after = page[-1]["number"]
+            last = tables.checks.last_number()
+            return list(problems_of_days(days, tables.checks.between(1, last), last))
+
+    def outbox(self, plant: str) -> "JournalOutbox":
+        """Return what copies this journal to a plant's database, and compares the two.
+
+        Args:
+            plant: URL of the database; nothing is opened yet.
+
+        Raises:
+            ConfigError: The URL is wrong, or this journal ends with the process.
+        """
+        if not self.durable:
+            raise JournalError(
+                tr("The journal {name} ends with its process.", name=self.location),
+                remedy=tr("Copy one in a file or a database."),
+            )
+        from robolink.journal._outbox import JournalOutbox  # few journals are copied
+
+        return JournalOutbox(self._store, self.location, plant)
+
+    def take_grown(self) -> bool:
+        """Return whether this process added entries since this was asked last."""
+        return self._store.take_grown()
 
     def count(self) -> int:
         """Return how many entries there are.
@@ -224,6 +353,19 @@ class Journal:
         """
         with self._store.read() as tables:
             return tables.names.addresses_of(controller)
+
+    def lease_of(self, controller: str) -> LeaseView | None:
+        """Return who has a controller locked, alive or not; ``None`` for nobody.
+
+        Args:
+            controller: Its identity, or the address at which it was met last.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._store.read() as tables:
+            seen = tables.leases.sight(tables.names.meant(controller))
+        return None if seen.token == FREE else seen
 
     def open_markers(self) -> tuple[tuple[str, Marker], ...]:
         """Return the unfinished jobs on any controller, with the controller's identity.
@@ -273,6 +415,15 @@ def _entry(row: Mapping[str, Any]) -> Recorded:
     )
 
 
+def _check(row: Mapping[str, Any]) -> RecordedCheck:
+    return RecordedCheck(
+        **{name: row[name] for name in ("number", "at", "controller", "cell", "verdict", "hash")},
+        well=bool(row["well"]),
+        details=_details(row["details"]),
+        signature=Signature(**{field.name: row[field.name] for field in fields(Signature)}),
+    )
+
+
 def _details(text: str | None) -> Mapping[str, object]:
     try:
         found = json.loads(text or "")
@@ -285,10 +436,3 @@ _PLAIN: Final = tuple(
     field.name for field in fields(Recorded) if field.name not in ("kind", "details", "signature")
 )
 _KINDS: Final = {str(kind): kind for kind in EntryKind}
-
-
-def _too_new(location: str) -> JournalError:
-    return JournalError(
-        tr("The journal {name} was made by a newer robolink.", name=location),
-        remedy=tr("Verify it with that version: this one does not know all fields of an entry."),
-    )

@@ -8,6 +8,8 @@ without that entry, is not one in which nothing is unsettled.
 """
 
 import json
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -77,6 +79,24 @@ def leave_trace(identity: str, journal: str, newest: tuple[int, str] | None) -> 
     }
     make_folder(path.parent)
     write_whole(path, json.dumps(known).encode())
+
+
+def carry_traces(
+    identities: Iterable[str], before: str, journal: str, newest: tuple[int, str] | None
+) -> None:
+    """Note where a record was moved, for the controllers whose record was where it was moved from.
+
+    Args:
+        identities: Of the controllers.
+        before: Where the record was kept.
+        journal: Where it is kept now.
+        newest: Number and hash of the newest entry there.
+    """
+    for identity in identities:
+        noted = _noted(identity)
+        if noted is not None and noted.journal == before:
+            with suppress(OSError):  # a record that was moved is found to go on all the same
+                leave_trace(identity, journal, newest)
 
 
 def traces_of(names: tuple[str, ...]) -> Traces | None:

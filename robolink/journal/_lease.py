@@ -97,13 +97,13 @@ class Lease:
         Raises:
             JournalError: It cannot be read.
         """
-        seen = self._sight()
-        if seen.token in (FREE, self._token):
+        seen = self.taken_by_another()
+        if seen is None:
             return ""
         who = seen.who()
         if not self._holder.shares_clock_with(who):
             return seen.at_work(tr("Watch it for a while to find out whether it is still working."))
-        silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
+        silent_s = self._silent_s(seen)
         if silent_s >= LEASE_S or self._holder.proves_gone(who):
             return ""
         return seen.at_work(
@@ -112,6 +112,33 @@ class Lease:
                 seconds=silent_s,
             )
         )
+
+    def taken_by_another(self) -> LeaseView | None:
+        """Return the lease as it is now if another has it, alive or not.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        seen = self._sight()
+        return None if seen.token in (FREE, self._token) else seen
+
+    def refuse_holder(self, *, silent: bool) -> None:
+        """Refuse while another process of this computer has it and responds, or is silent.
+
+        Only one that is known to run. Nothing is watched and nothing noted.
+
+        Raises:
+            LeaseHeldError: One has it.
+            JournalError: It cannot be read.
+        """
+        seen = self.taken_by_another()
+        if seen is None or not self._holder.knows_to_run(seen.who()):
+            return
+        silent_s = self._silent_s(seen)
+        if silent and silent_s >= LEASE_S:
+            raise seen.silent_error(self.controller, silent_s)
+        if not silent and silent_s < LEASE_S:
+            raise self._held_error(seen)
 
     def prepare(self) -> None:
         """Look, unless that was done or the lease is held; outside of any transaction."""
@@ -214,7 +241,7 @@ class Lease:
             return seen, tr("its process has ended")
         if not self._holder.shares_clock_with(who):
             seen = self._watched(seen)
-        elif self._clock.now_ns() - seen.beat_ns < LEASE_S * NS_PER_S:
+        elif self._silent_s(seen) < LEASE_S:
             raise self._held_error(seen)
         if seen.token == FREE:
             return seen, ""
@@ -231,6 +258,10 @@ class Lease:
             if not now.is_like(seen):
                 raise self._held_error(now)
         return seen
+
+    def _silent_s(self, seen: LeaseView) -> float:
+        """Return for how long a holder of this computer has been silent, s."""
+        return max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
 
     def _sight(self) -> LeaseView:
         with self._store.read(tr("The command was not sent.")) as tables:
@@ -265,8 +296,7 @@ class Lease:
         who = seen.who()
         self._decided(f"lease refused: {who.operator or 'somebody else'} has it")
         if self._holder.shares_clock_with(who):
-            silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
-            sign = tr("{seconds:.0f} s ago", seconds=silent_s)
+            sign = tr("{seconds:.0f} s ago", seconds=self._silent_s(seen))
         else:
             sign = tr("while it was watched just now")
         return seen.held_error(self.controller, sign)

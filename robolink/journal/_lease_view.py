@@ -59,6 +59,10 @@ class LeaseHolder:
         _, _, start = other.process_start.partition(" ")
         return self.can_tell(other) and _has_ended(other.pid, start)
 
+    def knows_to_run(self, other: "LeaseHolder") -> bool:
+        """Whether ``other`` is another process, and known to run."""
+        return self.pid != other.pid and self.can_tell(other) and not self.proves_gone(other)
+
     def can_tell(self, other: "LeaseHolder") -> bool:
         """Whether this process can find out if ``other`` still runs."""
         namespace, _, start = other.process_start.partition(" ")
@@ -196,7 +200,7 @@ class LeaseView:
         return LeaseHeldError(
             tr(
                 "{holder} has locked {controller} since {since}: {purpose}. Last response: {sign}.",
-                holder=describe(self.who()),
+                holder=describe_holder(self.who()),
                 controller=controller,
                 since=local_label(self.taken_at),
                 purpose=self.purpose,
@@ -210,6 +214,30 @@ class LeaseView:
             controller=controller,
         )
 
+    def silent_error(self, controller: str, silent_s: float) -> LeaseHeldError:
+        """Return the error that names a holder whose process runs and does not respond.
+
+        Args:
+            controller: Whose lease it is.
+            silent_s: For how long it has been silent, s.
+        """
+        return LeaseHeldError(
+            tr(
+                "{holder} has locked {controller} since {since}: {purpose}. Its process still "
+                "runs, but has not responded for {seconds:.0f} s.",
+                holder=describe_holder(self.who()),
+                controller=controller,
+                since=local_label(self.taken_at),
+                purpose=self.purpose,
+                seconds=silent_s,
+            ),
+            remedy=tr(
+                "Nothing was sent. Look at the robot. Then stop it and end that program: {end}.",
+                end=remedy_word(RemedyWord.END_HOLDER),
+            ),
+            controller=controller,
+        )
+
     def at_work(self, alive: str) -> str:
         """Return the sentences about a holder who is working.
 
@@ -218,7 +246,7 @@ class LeaseView:
         """
         said = tr(
             "{holder} has had this controller locked since {since}: {purpose}.",
-            holder=describe(self.who()),
+            holder=describe_holder(self.who()),
             since=local_label(self.taken_at),
             purpose=self.purpose,
         )
@@ -234,7 +262,7 @@ class LeaseView:
             return tr("Somebody else took over {controller} meanwhile.", controller=controller)
         return tr(
             "{holder} took over {controller} on {since}: {purpose}.",
-            holder=describe(self.who()),
+            holder=describe_holder(self.who()),
             controller=controller,
             since=local_label(self.taken_at),
             purpose=self.purpose,
@@ -251,7 +279,7 @@ class LeaseView:
         if self.token == FREE:
             verdict = tr("Nobody had this controller locked; {because}.", because=because)
         else:
-            holder = describe(self.who())
+            holder = describe_holder(self.who())
             verdict = (
                 tr(
                     "{holder} had this controller locked before: {because}.",
@@ -261,7 +289,7 @@ class LeaseView:
                 if insisting is None
                 else tr(
                     "{insisting} took over this controller from {holder}: {because}.",
-                    insisting=describe(insisting),
+                    insisting=describe_holder(insisting),
                     holder=holder,
                     because=because,
                 )
@@ -281,7 +309,7 @@ class LeaseView:
         return (self.epoch, self.token, self.beat) == (other.epoch, other.token, other.beat)
 
 
-def describe(holder: LeaseHolder) -> str:
+def describe_holder(holder: LeaseHolder) -> str:
     """Return who it is, for display."""
     if holder == LeaseHolder():
         return tr("Somebody unknown")
@@ -335,10 +363,10 @@ def run_of(client: str, here: LeaseHolder) -> ClientRun | None:
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
     if here.proves_gone(holder):
-        return ClientRun(describe(holder), since, lives=False)
+        return ClientRun(describe_holder(holder), since, lives=False)
     # This process too: an earlier session of it may have ended, which is not known here.
     lives = True if here.can_tell(holder) and holder != here else None
-    return ClientRun(describe(holder), since, lives=lives)
+    return ClientRun(describe_holder(holder), since, lives=lives)
 
 
 def _outdated(folder: Path) -> Iterator[Path]:

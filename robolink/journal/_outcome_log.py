@@ -9,7 +9,7 @@ from robolink import runtime
 from robolink.errors import JournalError, LeaseLostError, OutcomeUnknownError
 from robolink.interrupts import seen_through
 from robolink.journal._identity import Names, Naming
-from robolink.journal._journal_loss import LOST, Traces, leave_trace, traces_of
+from robolink.journal._journal_loss import LOST, leave_trace, traces_of
 from robolink.journal._lease import Lease
 from robolink.journal._lease_view import (
     BootClock,
@@ -248,14 +248,8 @@ class JournalOutcomeLog:
             found = tables.markers.of(*names)
             if traces is None or found:
                 return found
-            self._whole = tables.entries.history(names) and self._goes_on(traces, tables)
+            self._whole = tables.goes_on(traces, names, self._journal.location)
         return () if self._whole else (traces.marker(self._journal.location),)
-
-    def _goes_on(self, traces: Traces, tables: "Tables") -> bool:
-        """Whether this still is the record of the controller, wherever it was moved."""
-        if traces.newest is None or traces.journal == self._journal.location:
-            return True
-        return tables.entries.holds(*traces.newest)
 
     def _begin_anew(self, name: str, newest: tuple[int, str] | None) -> None:
         """Note that the record of a controller is kept here, at a person's request.
@@ -333,6 +327,12 @@ class JournalOutcomeLog:
         with self._lock:
             self._named()
             return self._lease.at_work()
+
+    def refuse_holder(self, *, silent: bool) -> None:
+        """Refuse what another process of this computer is in the way of; see the model."""
+        with self._lock:
+            self._named()
+            self._lease.refuse_holder(silent=silent)
 
     @contextmanager
     def hold(self, purpose: str) -> Iterator[None]:
@@ -413,8 +413,15 @@ class JournalOutcomeLog:
     def _writing(self, consequence: str = "", then: str = "") -> Iterator["Tables"]:
         """Write in one transaction; answers that it recorded are kept no longer."""
         self._told = 0
-        with self._store.write(consequence, then) as tables:
-            yield tables
+        try:
+            with self._store.write(consequence, then) as tables:
+                yield tables
+        except JournalError as error:
+            from robolink.journal.store.seal import MovedRecordError
+
+            if isinstance(error, MovedRecordError):
+                raise error.about(self._names.all) from error
+            raise
         del self._answers[: self._told]
 
     def _put(self, tables: "Tables", name: str, entries: Sequence[NewEntry]) -> None:

@@ -8,12 +8,12 @@ drive. Other systems tell neither here, and a share is not recognized there.
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from typing import Final
 
-from robolink.errors import JournalError
+from robolink.errors import ConfigError, JournalError
 from robolink.messages import tr
 
 _SQLITE: Final = "sqlite:///"
@@ -51,21 +51,59 @@ class JournalPlace:
     url: str = field(default="", repr=False)
 
 
-def default_location() -> str:
-    """Return the URL of this user's journal.
+_named: dict[str, str] = {}
+"""Journals that the cell files name for this process, by the address of the controller; under an
+empty address the one of everything else."""
+
+
+def name_journals(places: Mapping[str, str], *, afresh: bool = False) -> None:
+    """Look for journals where the cell files name them, from now on in this process.
+
+    The environment goes before (:func:`default_location`).
+
+    Args:
+        places: URLs or paths of journals, by the address of a controller; under an empty address
+            that of everything else. An empty place names none.
+        afresh: Whether what was named before is forgotten.
+    """
+    global _named  # noqa: PLW0603 - a process has one environment, and one set of cell files
+    _named = {} if afresh else dict(_named)
+    _named.update(places)
+
+
+def named_by_environment() -> str:
+    """Return the environment variable that says where the journal is; empty for none."""
+    variables = ("ROBOLINK_JOURNAL", "ROBOLINK_STATE_DIR")
+    return next((name for name in variables if os.environ.get(name)), "")
+
+
+def default_location(address: str = "") -> str:
+    """Return the URL of the journal of a controller, or of this user.
 
     ROBOLINK_JOURNAL names it, as a URL or as a path. Without that it is ``journal.db`` in
-    ROBOLINK_STATE_DIR or, without that too, in the user's data folder for robolink.
+    ROBOLINK_STATE_DIR; without that, what the cell files name (:func:`name_journals`); and
+    without that too, ``journal.db`` in the user's data folder for robolink.
+
+    Args:
+        address: How the controller is reached; empty for the journal of this user.
     """
-    named = os.environ.get("ROBOLINK_JOURNAL")
+    variable = named_by_environment()
+    if variable == "ROBOLINK_STATE_DIR":
+        return _file_location(Path(os.environ[variable]) / "journal.db")
+    named = os.environ[variable] if variable else _named.get(address) or _named.get("", "")
     if named:
         return named if "://" in named else _file_location(Path(named))
-    folder = os.environ.get("ROBOLINK_STATE_DIR")
-    if folder:
-        return _file_location(Path(folder) / "journal.db")
     from platformdirs import user_data_path
 
     return _file_location(user_data_path("robolink", appauthor=False) / "journal.db")
+
+
+def shown_location(location: str) -> str:
+    """Return a journal's URL without its password, or the path of a file."""
+    if location.startswith(_SQLITE) or "://" not in location:
+        return location.removeprefix(_SQLITE)
+    scheme, _, rest = location.partition("://")
+    return f"{scheme}://{_without_password(rest)}"
 
 
 def may_exist(location: str) -> bool:
@@ -102,6 +140,21 @@ def place_of(location: str) -> JournalPlace:
             "ROBOLINK_JOURNAL."
         ),
     )
+
+
+def plant_place(url: str) -> JournalPlace:
+    """Parse the URL of a plant's database; nothing is opened.
+
+    Raises:
+        ConfigError: It names no PostgreSQL database.
+    """
+    place = place_of(url) if url.partition("://")[0].startswith("postgresql") else None
+    if place is None:
+        raise ConfigError(
+            tr("{url!r} names no database of a plant.", url=_without_password(url)),
+            remedy=tr("Name it as postgresql://user@host/database."),
+        )
+    return place
 
 
 def memory_place(identity: str) -> JournalPlace:

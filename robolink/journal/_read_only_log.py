@@ -180,6 +180,10 @@ class ReadOnlyLog:
         """See the model; raises as :meth:`begin`: who looks at the lease is about to write."""
         self._log().look()
 
+    def refuse_holder(self, *, silent: bool) -> None:
+        """See the model; raises as :meth:`begin`."""
+        self._log().refuse_holder(silent=silent)
+
     def hold(self, purpose: str) -> AbstractContextManager[None]:
         """See the model; raises as :meth:`begin`."""
         return self._log().hold(purpose)

@@ -266,6 +266,7 @@ _NOT_ABOUT_A_CHANGE = (
     EntryKind.RAW,
     EntryKind.RUN,
     EntryKind.PANEL,
+    EntryKind.JOURNAL,
     EntryKind.DECISION,
 )
 """Kinds of entries whose tool, if any, was not changed."""

@@ -103,7 +103,7 @@ class Record:
         problems: What is wrong with the journal, one sentence each.
     """
 
-    json_version: ClassVar[int] = 3
+    json_version: ClassVar[int] = 5
     change: str
     signature: Signature
     people: tuple[str, ...]
@@ -150,7 +150,7 @@ class Report:
             nothing says so.
     """
 
-    json_version: ClassVar[int] = 3
+    json_version: ClassVar[int] = 5
     made_at: str
     robolink_version: str
     controller: str

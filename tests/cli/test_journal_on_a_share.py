@@ -4,7 +4,7 @@ import pytest
 from robolink_cli.commands.computer.checkup import Level, check_journal
 
 from robolink.errors import JournalError
-from robolink.journal import _places, open_journal
+from robolink.journal import _places, move_journal, open_journal
 from robolink.journal._connections import close_files
 
 
@@ -33,6 +33,9 @@ def test_a_journal_on_a_share_is_refused_before_anything_is_made(share, tmp_path
     with pytest.raises(JournalError, match="nfs4"):
         open_journal(str(tmp_path / "short" / "journal.db"))
     assert open_journal(str(tmp_path / "journal.db")).durable
+    with pytest.raises(JournalError, match="nfs4"):
+        move_journal(str(share / "new.db"), source=str(tmp_path / "journal.db"))
+    assert not list(share.iterdir())
 
 
 def test_where_the_mounts_cannot_be_read_nothing_is_refused(share, monkeypatch, tmp_path):

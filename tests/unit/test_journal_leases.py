@@ -425,3 +425,69 @@ def behind_commit(number):
 
     with observed(passed):
         yield
+
+
+# Who is refused, and named, before anything is connected or in place of a silent holder.
+
+
+def parent_process():
+    """Return the process that started this one, as the holder of a lease; it is known to run."""
+    stat = Path(f"/proc/{os.getppid()}/stat").read_text()
+    start = stat.rpartition(")")[2].split()[19]
+    namespace = HERE.process_start.partition(" ")[0]
+    return replace(ANNA, pid=os.getppid(), process_start=f"{namespace} {start}")
+
+
+def of_this_process(holder):
+    """Return a holder with the number of this process: the tests may run in a fork of the first."""
+    return replace(holder, pid=os.getpid())
+
+
+def refusals(bert):
+    """Return what a log says of a holder that responds, and of one that is silent."""
+
+    def refusal(*, silent):
+        try:
+            bert.refuse_holder(silent=silent)
+        except LeaseHeldError as error:
+            return error
+        return None
+
+    return [refusal(silent=False), refusal(silent=True)]
+
+
+def test_a_holder_that_runs_is_refused_while_it_responds_and_named_when_it_is_silent(leases):
+    running, bert = leases.log(parent_process()), leases.log(of_this_process(BERT))
+    assert refusals(bert) == [None, None]
+    running.begin(marker("a"))
+    leases.clock.advance(LEASE_S - 1)
+    responds, silent = refusals(bert)
+    assert ("9 s ago" in responds.what, silent) == (True, None)
+    leases.clock.advance(2)
+    responds, silent = refusals(bert)
+    assert responds is None
+    for told in (f"process {os.getppid()}", "Anna", "TLSet 3", "has not responded for 11 s"):
+        assert told in silent.what
+    assert "end_process" in silent.remedy
+    seen = leases.journal.lease_of(IDENTITY)
+    assert (seen.who().pid, leases.journal.lease_of("another")) == (os.getppid(), None)
+    bert.look()  # who is no order may still take it over
+    bert.begin(marker("b"))
+
+
+@pytest.mark.parametrize(
+    "holder",
+    [
+        None,  # this process: another connection of it
+        replace(parent_process(), process_start="pid:[1] 1"),  # a container has its own numbers
+        replace(parent_process(), process_start=f"{HERE.process_start.partition(' ')[0]} 1"),
+        ELSEWHERE,
+    ],
+    ids=["this process", "a container", "has ended", "another computer"],
+)
+def test_whoever_is_not_known_to_run_is_in_nobodys_way_before_a_connection(leases, holder):
+    leases.log(holder or of_this_process(ANNA)).begin(marker("a"))
+    bert = leases.log(of_this_process(BERT))
+    assert refusals(bert) == [None, None]
+    leases.clock.advance(LEASE_S + 1)
+    assert refusals(bert) == [None, None]

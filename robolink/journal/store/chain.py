@@ -37,9 +37,14 @@ def storable(text: str) -> str:
 
 def digest(row: Mapping[str, object]) -> str:
     """Return the SHA-256 of a stored entry, over every field but the hash itself."""
+    return sha256(hashed_text(row).encode()).hexdigest()
+
+
+def hashed_text(row: Mapping[str, object]) -> str:
+    """Return the whole of a stored entry but its hash, as the text of which that is taken."""
     if "hash" in row:
         row = {name: value for name, value in row.items() if name != "hash"}
-    return sha256(canonical(row).encode()).hexdigest()
+    return canonical(row)
 
 
 class ChainCheck:
@@ -59,8 +64,13 @@ class ChainCheck:
     @classmethod
     def before(cls, row: Mapping[str, Any]) -> "ChainCheck":
         """Return a check that starts at an entry and trusts its link to the one before."""
+        return cls.behind(row["number"] - 1, str(row["previous"]))
+
+    @classmethod
+    def behind(cls, number: int, its_hash: str) -> "ChainCheck":
+        """Return a check of what follows an entry."""
         check = cls()
-        check.number, check.hash = row["number"] - 1, str(row["previous"])
+        check.number, check.hash = number, its_hash
         return check
 
     def problems_of(self, row: Mapping[str, Any]) -> Iterator[str]:

@@ -18,6 +18,7 @@ from robolink import runtime
 from robolink.errors import JournalError
 from robolink.files.durable import make_folder, sync_folder
 from robolink.journal._places import JournalPlace
+from robolink.journal.store import statements
 from robolink.messages import tr
 from robolink.timing import Deadline, SystemClock
 
@@ -27,6 +28,11 @@ NOTHING: Final[Values] = {}
 
 _SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the database uses
 _PLACE: Final = r":(\w+)"
+
+MOVED_WORDS: Final = "this record was moved to another journal, which moved_records names"
+"""What the database says about a row of a record that was moved; an earlier robolink shows it."""
+
+_MOVED: Final = "SELECT 1 FROM moved_records WHERE name IN ('', NEW.controller)"
 
 
 class DatabaseConnection:
@@ -38,12 +44,20 @@ class DatabaseConnection:
         begin_writing: Takes the write lock at the start of a transaction; empty where each
             statement takes its own.
         begin_migrating: Keeps others from changing the tables until the transaction ends.
+        begin_snapshot: Lets all queries of a transaction see one state, as its first statement.
+        lock_journal: Lets the caller's transaction alone write the journal, while others read;
+            empty where ``begin_writing`` does.
+        has_moves: Query that finds a row where the journal has ``moved_records``.
+        guards: Make the database refuse rows of records that were moved: first statements without
+            a place, then those with the place of a table.
+        unguards: Take that back.
         row_lock: Ends a query whose row is about to be changed.
         self_checks: Queries by which it looks for damage in small tables; each answers "ok".
             PostgreSQL checks each page that it reads.
         table_names: Query for the tables that others made, too.
         number_type: Of a column of numbers that is the key: SQLite keeps a table in the order of
             its key only if the key is called INTEGER.
+        has_schemas: Whether tables stand in schemas.
         keyed_table: Ends the definition of a table that is its own index. A table and an index
             of it are two pages in each commit.
         driver: The driver's connection.
@@ -55,6 +69,19 @@ class DatabaseConnection:
 
     begin_writing: ClassVar[str] = "BEGIN IMMEDIATE"
     begin_migrating: ClassVar[str] = "BEGIN IMMEDIATE"
+    begin_snapshot: ClassVar[str] = "BEGIN"
+    lock_journal: ClassVar[str] = ""
+    has_moves: ClassVar[str] = "SELECT 1 FROM sqlite_master WHERE name = 'moved_records'"
+    guards: ClassVar[Sequence[str]] = tuple(
+        [
+            f"CREATE TRIGGER IF NOT EXISTS {{table}}_moved_{event} BEFORE {event} ON {{table}} "
+            f"WHEN EXISTS ({_MOVED}) BEGIN SELECT RAISE(ABORT, '{MOVED_WORDS}'); END"
+            for event in ("insert", "update")
+        ]
+    )
+    unguards: ClassVar[Sequence[str]] = tuple(
+        [f"DROP TRIGGER IF EXISTS {{table}}_moved_{event}" for event in ("insert", "update")]
+    )
     row_lock: ClassVar[str] = ""
     self_checks: ClassVar[Sequence[str]] = tuple(
         [f"PRAGMA quick_check({name})" for name in ("markers", "leases", "head")]
@@ -65,6 +92,7 @@ class DatabaseConnection:
     )
     number_type: ClassVar[str] = "INTEGER"
     keyed_table: ClassVar[str] = " WITHOUT ROWID"
+    has_schemas: ClassVar[bool] = False
 
     def __init__(self, driver: Any, *, lasting: bool = False) -> None:  # noqa: ANN401 - of two
         self.driver = driver
@@ -106,6 +134,12 @@ class DatabaseConnection:
         found: Sequence[Sequence[Any]] = self._cursor.fetchall()
         return found
 
+    def table(self, name: str) -> list[dict[str, Any]]:
+        """Return all rows of a small table, by the names of its columns."""
+        rows = self.rows(statements.all_of_table(name))
+        columns = [column[0] for column in self._cursor.description]
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+
     def _worded(self, statement: str) -> str:
         return statement
 
@@ -115,6 +149,24 @@ class PostgresqlConnection(DatabaseConnection):
 
     begin_writing = ""
     begin_migrating = f"SELECT pg_advisory_xact_lock({_SCHEMA_LOCK})"
+    begin_snapshot = "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ"
+    lock_journal = "LOCK TABLE {tables} IN SHARE ROW EXCLUSIVE MODE"
+    has_moves = "SELECT 1 WHERE to_regclass('moved_records') IS NOT NULL"
+    # With the rights of the owner: who may only append may not read all tables.
+    guards = (
+        "CREATE OR REPLACE FUNCTION refuse_moved_record() RETURNS trigger LANGUAGE plpgsql "
+        "SECURITY DEFINER SET search_path FROM CURRENT AS $$ BEGIN "
+        f"IF EXISTS ({_MOVED}) THEN RAISE EXCEPTION USING MESSAGE = '{MOVED_WORDS}'; END IF; "
+        "RETURN NEW; END $$",
+        "GRANT SELECT ON moved_records TO PUBLIC",
+        "DROP TRIGGER IF EXISTS moved_record ON {table}",
+        "CREATE TRIGGER moved_record BEFORE INSERT OR UPDATE ON {table} "
+        "FOR EACH ROW EXECUTE FUNCTION refuse_moved_record()",
+    )
+    unguards = (
+        "DROP TRIGGER IF EXISTS moved_record ON {table}",
+        "DROP FUNCTION IF EXISTS refuse_moved_record()",
+    )
     row_lock = " FOR UPDATE"
     self_checks = ()
     table_names = (
@@ -125,6 +177,7 @@ class PostgresqlConnection(DatabaseConnection):
     )
     number_type = "BIGINT"
     keyed_table = ""
+    has_schemas = True
 
     def roll_back(self) -> None:
         """Undo what was done since the last end; on a lost connection that ended with it."""
@@ -310,7 +363,7 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
     settings = [f"SET lock_timeout = {round(BUSY_S * 1000)}", "SET synchronous_commit TO on"]
     if read_only:
         settings.append("SET default_transaction_read_only TO on")
-    where: dict[str, Any] = {**parameters_of(place.url), **_NOTICED}
+    where = server_parameters(place.url)
 
     def connect() -> DatabaseConnection:
         connection = PostgresqlConnection(psycopg.connect(**where))
@@ -324,6 +377,11 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
         return connection
 
     return Backend(connect, failures=(psycopg.Error,))
+
+
+def server_parameters(url: str) -> dict[str, Any]:
+    """Return libpq's parameters for a URL, with which a server that is gone is noticed soon."""
+    return {**parameters_of(url), **_NOTICED}
 
 
 def parameters_of(url: str) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """Statements about entries: the queries, and their results."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
@@ -74,6 +75,7 @@ class EntryRows:
     def __init__(self, connection: DatabaseConnection) -> None:
         self._connection = connection
         self._head: _Head | None = None  # a guess: other processes add entries too
+        self._added = False
 
     def append(
         self, controller: str, signature: Signature, change: str, entries: Sequence[NewEntry]
@@ -100,6 +102,12 @@ class EntryRows:
             rows = _chained(head, _common(controller, signature), change, entries)
             self._move_head(head, rows[-1])
         self._connection.run_many(statements.ADD_ENTRY, rows)
+        self._added = True
+
+    def take_added(self) -> bool:
+        """Return whether any were added since this was asked last."""
+        added, self._added = self._added, False
+        return added
 
     def page(
         self, wanted: Filter, *, before: int | None, after: int | None, limit: int
@@ -132,6 +140,21 @@ class EntryRows:
         """Whether an entry of this number and hash is there."""
         found = self.page(Filter(), after=number - 1, before=number + 1, limit=1)
         return any(row["hash"] == its_hash for row in found)
+
+    def came_from(self, journal: str) -> tuple[int, str] | None:
+        """Return the last entry of the shared journal that this record was moved out of.
+
+        Args:
+            journal: Location of that journal.
+
+        Returns:
+            Number and hash; ``None`` where the record does not come from there.
+        """
+        for row in self.page(Filter(kinds=(EntryKind.JOURNAL,)), before=2, after=0, limit=1):
+            said = json.loads(row["details"])
+            if said.get("from") == journal:
+                return int(said["last_number"]), str(said["last_hash"])
+        return None
 
     def count(self) -> int:
         """Return how many there are."""

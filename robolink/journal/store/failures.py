@@ -44,7 +44,7 @@ def journal_error(error: Exception, name: str, consequence: str, then: str = "")
         consequence: What it means for the controller, one sentence.
         then: What to do once the journal can be used again; a new one does not know of it.
     """
-    reason, text = _reason(error), " ".join(str(error).split())
+    reason, text = reason_of(error), " ".join(str(error).split())
     if reason == "damaged":
         return damaged_error(text, name, consequence)
     cause, remedy = _sentences(reason, text)
@@ -52,6 +52,15 @@ def journal_error(error: Exception, name: str, consequence: str, then: str = "")
         listed(tr("The journal {name} cannot be used:", name=name), [cause]),
         remedy=joined(" ", filter(None, (consequence, remedy, then))),
     )
+
+
+def cause_of(error: Exception) -> str:
+    """Return what happened to a database, for an error about another one than a journal.
+
+    Args:
+        error: As the driver or the system raised it.
+    """
+    return _sentences(reason_of(error), " ".join(str(error).split()))[0]
 
 
 def damaged_error(found: str, name: str, consequence: str) -> JournalError:
@@ -69,7 +78,8 @@ def damaged_error(found: str, name: str, consequence: str) -> JournalError:
     )
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
+    """Return what an error of the database, the driver or the system is about; empty for else."""
     if isinstance(error, PermissionError):
         return "forbidden"
     if isinstance(error, UnicodeDecodeError):

@@ -60,6 +60,22 @@ _ROBOTS: Final = """
 """
 
 
+_CHECKS: Final = """
+    CREATE TABLE IF NOT EXISTS checks (
+        number {number_type} NOT NULL, at TEXT NOT NULL, controller TEXT NOT NULL,
+        cell TEXT NOT NULL, well INTEGER NOT NULL, verdict TEXT NOT NULL, details TEXT NOT NULL,
+        operator TEXT NOT NULL, role TEXT NOT NULL, os_user TEXT NOT NULL, host TEXT NOT NULL,
+        nozzle TEXT NOT NULL, lot TEXT NOT NULL, recipe TEXT NOT NULL, recipe_hash TEXT NOT NULL,
+        station TEXT NOT NULL, version TEXT NOT NULL, hash TEXT NOT NULL, PRIMARY KEY (number)
+    );
+    CREATE TABLE IF NOT EXISTS check_head (
+        number {number_type} NOT NULL, closed {number_type} NOT NULL,
+        kept_from {number_type} NOT NULL, day TEXT NOT NULL
+    );
+    CREATE INDEX IF NOT EXISTS checks_by_controller ON checks (controller, number)
+"""
+
+
 def _first_tables(connection: DatabaseConnection) -> None:
     _run_all(
         connection,
@@ -87,18 +103,43 @@ def _robots(connection: DatabaseConnection) -> None:
     _run_all(connection, _ROBOTS)
 
 
+def _checks(connection: DatabaseConnection) -> None:
+    """Record checks of cells outside the chain, so that old ones can be deleted.
+
+    Entries of kind check that are there stay what they are.
+    """
+    _run_all(connection, _CHECKS.format(number_type=connection.number_type))
+    connection.run(statements.FIRST_CHECK_HEAD)
+
+
 def _run_all(connection: DatabaseConnection, script: str) -> None:
     for statement in script.split(";"):  # executescript of sqlite3 would commit first
         connection.run(statement.strip())
 
 
-MIGRATIONS: tuple[Callable[[DatabaseConnection], None], ...] = (_first_tables, _names, _robots)
+MIGRATIONS: tuple[Callable[[DatabaseConnection], None], ...] = (
+    _first_tables,
+    _names,
+    _robots,
+    _checks,
+)
+
+OF_CONTROLLERS: Final = ("addresses", "former_names", "robots", "leases")
+"""Tables that say whose their rows are, in a column ``controller``; entries and markers do too."""
+
+CARRIED: Final = (*OF_CONTROLLERS, "checks", "check_head")
+"""Tables that a journal takes with it when it is moved, besides the entries and their head. There
+is no marker then."""
 
 NAMED: Final = 2
 """First schema version that separates names from addresses."""
 
 OF_ROBOTS: Final = 3
 """First schema version that separates the robots of one controller."""
+
+
+CHECKED: Final = 4
+"""First schema version that records checks outside the chain."""
 
 
 def stored_version(connection: DatabaseConnection, name: str) -> int:
@@ -145,9 +186,21 @@ def newer_error(name: str, found: int) -> JournalError:
     )
 
 
-def empty_error(name: str) -> JournalError:
-    """Return the error about a database in which nobody has made the tables yet."""
+def unknown_fields_error(name: str) -> JournalError:
+    """Return the error about work for which every field of an entry has to be known."""
     return JournalError(
+        tr("The journal {name} was made by a newer robolink.", name=name),
+        remedy=tr("Do this with that version: this one does not know all fields of an entry."),
+    )
+
+
+class EmptyJournalError(JournalError):
+    """Nobody has made the tables yet."""
+
+
+def empty_error(name: str) -> EmptyJournalError:
+    """Return the error about a database in which nobody has made the tables yet."""
+    return EmptyJournalError(
         tr("The journal {name} is empty.", name=name),
         remedy=tr("robolink creates it at the first change."),
     )

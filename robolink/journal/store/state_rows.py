@@ -36,6 +36,11 @@ class LeaseRows:
         rows = self._connection.rows(statements.LEASE, {"of_controller": storable(controller)})
         return LeaseView(*rows[0]) if rows else LeaseView()
 
+    def of_all(self) -> tuple[tuple[str, LeaseView], ...]:
+        """Return every lease with the identity of its controller."""
+        rows = self._connection.rows(statements.ALL_LEASES)
+        return tuple([(str(controller), LeaseView(*lease)) for controller, *lease in rows])
+
     def renew(self, controller: str, epoch: int, token: str, now_ns: int) -> bool:
         """Count one more beat; return whether the lease still is this holder's."""
         values = {**_own(controller, epoch, token), "now_ns": now_ns}
@@ -244,6 +249,12 @@ class NameRows:
     def robots(self, controller: str) -> tuple[str, ...]:
         """Return the names under which robots of a controller have entries of their own."""
         return self._all(statements.ROBOTS_OF, controller) if self._robots_known else ()
+
+    def owner(self, name: str) -> str:
+        """Return the controller whose record one under ``name`` is; of a robot its controller."""
+        identity = self.meant(name)
+        robot_of = self._one(statements.ROBOT_OF, identity) if self._robots_known else ""
+        return robot_of or identity
 
     def in_use(self, name: str) -> bool:
         """Whether anything is on record under ``name`` itself."""

@@ -92,6 +92,45 @@ def _one_of(column: str, beginning: str, places: Iterable[str]) -> str:
     return f"{column} = {found[0]}" if len(found) == 1 else f"{column} IN ({', '.join(found)})"
 
 
+# ---- Checks
+
+CHECK_COLUMNS: Final = (
+    *("number", "at", "controller", "cell", "well", "verdict", "details"),
+    *(field.name for field in fields(Signature)),
+    "hash",
+)
+"""Columns of the records of checks."""
+
+ADD_CHECK: Final = (
+    f"INSERT INTO checks ({', '.join(CHECK_COLUMNS)}) "
+    f"VALUES ({', '.join(f':{name}' for name in CHECK_COLUMNS)})"
+)
+FIRST_CHECK_HEAD: Final = (
+    "INSERT INTO check_head (number, closed, kept_from, day) VALUES (0, 0, 1, '')"
+)
+CHECK_HEAD: Final = "SELECT number, closed, kept_from, day FROM check_head"
+COUNT_CHECKS: Final = "UPDATE check_head SET number = number + :count"
+CLOSE_CHECKS: Final = "UPDATE check_head SET closed = :closed, kept_from = :kept_from, day = :day"
+LAST_OLD_CHECK: Final = "SELECT max(number) FROM checks WHERE number <= :closed AND at < :cutoff"
+FORGET_CHECKS: Final = "DELETE FROM checks WHERE number <= :last"
+
+
+@lru_cache(maxsize=64)
+def checks_where(places: tuple[str, ...], *, newest_first: bool) -> str:
+    """Return the query for up to ``:limit`` checks that has these places.
+
+    Args:
+        places: Names of its values: ``before``, ``after``, and names of a controller.
+        newest_first: In which order.
+    """
+    wanted = [condition for name, condition in _WHERE.items() if name in places]
+    if any(name.startswith(NAME) for name in places):
+        wanted.append(_one_of("controller", NAME, places))
+    where = f" WHERE {' AND '.join(wanted)}" if wanted else ""
+    order = "number DESC" if newest_first else "number"
+    return f"SELECT {', '.join(CHECK_COLUMNS)} FROM checks{where} ORDER BY {order} LIMIT :limit"
+
+
 # ---- Markers
 
 _MARKERS: Final = "SELECT controller, operation, kind, request, begun_at, details FROM markers"
@@ -121,10 +160,9 @@ _CLAIMED: Final = (
     "epoch = epoch + 1, token = :token, holder = :holder, beat_ns = :beat_ns, boot = :boot, "
     "taken_at = :taken_at, purpose = :purpose"
 )
-LEASE: Final = (
-    "SELECT epoch, token, beat, beat_ns, holder, taken_at, purpose FROM leases "
-    "WHERE controller = :of_controller"
-)
+_LEASE: Final = "epoch, token, beat, beat_ns, holder, taken_at, purpose FROM leases"
+LEASE: Final = f"SELECT {_LEASE} WHERE controller = :of_controller"
+ALL_LEASES: Final = f"SELECT controller, {_LEASE} ORDER BY controller"
 FIRST_LEASE: Final = f"""
     INSERT INTO leases
         (controller, epoch, token, holder, beat, beat_ns, boot, taken_at, purpose)
@@ -165,11 +203,53 @@ ROBOTS_OF: Final = "SELECT name FROM robots WHERE controller = :of_name ORDER BY
 ADD_ROBOT: Final = (
     f"INSERT INTO robots (name, controller) VALUES (:of_name, :to_name) {_UNLESS_THERE}"
 )
+ROBOT_OF: Final = "SELECT controller FROM robots WHERE name = :of_name"
 MOVE_ROBOT: Final = "UPDATE robots SET controller = :to_name WHERE name = :of_name"
 MARKER_OR_LEASE_OF: Final = (
     "SELECT controller FROM markers WHERE controller = :of_name "
     "UNION ALL SELECT controller FROM leases WHERE controller = :of_name"
 )
+
+# ---- Moves
+
+PUT_HEAD: Final = "UPDATE head SET number = :number, hash = :hash"
+MOVED_RECORDS: Final = """
+    CREATE TABLE IF NOT EXISTS moved_records (
+        name TEXT NOT NULL, state TEXT NOT NULL, place TEXT NOT NULL, at TEXT NOT NULL,
+        number BIGINT NOT NULL, hash TEXT NOT NULL, PRIMARY KEY (name)
+    )
+"""
+MOVES: Final = "SELECT name, state, place, at, number, hash FROM moved_records ORDER BY name"
+ADD_MOVE: Final = """
+    INSERT INTO moved_records (name, state, place, at, number, hash)
+    VALUES (:name, :state, :place, :at, :number, :hash)
+"""
+REMOVE_MOVE: Final = "DELETE FROM moved_records WHERE name = :name"
+ADD_TO_VERSION: Final = "UPDATE schema_version SET version = version + :much WHERE version < :much"
+TAKE_FROM_VERSION: Final = (
+    "UPDATE schema_version SET version = version - :much WHERE version >= :much"
+)
+CONTROLLERS: Final = "SELECT DISTINCT controller FROM entries"
+
+
+def all_of_table(table: str) -> str:
+    """Return the query for all rows of a table."""
+    return f"SELECT * FROM {table}"
+
+
+def empty_table(table: str) -> str:
+    """Return the statement that removes all rows of a table."""
+    return f"DELETE FROM {table}"
+
+
+def add_to_table(table: str, columns: Iterable[str]) -> str:
+    """Return the statement that adds a row to a table, with values by the names of its columns."""
+    named = tuple(columns)
+    return (
+        f"INSERT INTO {table} ({', '.join(named)}) "
+        f"VALUES ({', '.join(f':{name}' for name in named)})"
+    )
+
 
 # ---- All of them
 

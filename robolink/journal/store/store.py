@@ -7,20 +7,36 @@ the whole journal; ``verify`` reads the rest.
 """
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, closing, contextmanager
 from typing import Final
 
 from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
-from robolink.journal._journal_loss import traces_of
-from robolink.journal._places import JournalPlace
+from robolink.journal._journal_loss import Traces, traces_of
+from robolink.journal._places import JournalPlace, place_of
 from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
-from robolink.journal.store.connection import Backend, DatabaseConnection, backend_of
+from robolink.journal.store.check_rows import CheckRows
+from robolink.journal.store.connection import (
+    MOVED_WORDS,
+    Backend,
+    DatabaseConnection,
+    backend_of,
+)
 from robolink.journal.store.entry_rows import DamagedHeadError, EntryRows, Filter
 from robolink.journal.store.failures import damaged_error, journal_error
+from robolink.journal.store.seal import (
+    SEALED,
+    Moved,
+    MovedRecordError,
+    MoveState,
+    move_of,
+    moved_error,
+    moves_in,
+    take_into_use,
+)
 from robolink.journal.store.state_rows import LeaseRows, MarkerRows, NameRows
 from robolink.messages import tr
 
@@ -38,8 +54,10 @@ class Tables:
         entries: The append-only record.
         markers: What is not settled.
         leases: Who may change which controller.
+        checks: The records of checks, outside the chain.
         names: Who is meant by a name or an address.
-        newer: Whether a newer robolink made the tables.
+        version: Form of the tables, whether the journal is sealed or not.
+        newer: Whether a newer robolink made them.
     """
 
     def __init__(self, connection: DatabaseConnection, version: int) -> None:
@@ -47,11 +65,13 @@ class Tables:
         self.entries = EntryRows(connection)
         self.markers = MarkerRows(connection)
         self.leases = LeaseRows(connection)
+        self.checks = CheckRows(connection, self.entries, known=version >= migrations.CHECKED)
         self.names = NameRows(
             connection,
             known=version >= migrations.NAMED,
             robots_known=version >= migrations.OF_ROBOTS,
         )
+        self.version = version
         self.newer = version > len(migrations.MIGRATIONS)
 
     def in_order(self, address: str, location: str) -> bool:
@@ -67,10 +87,44 @@ class Tables:
         name = self.names.at(address)
         if not name or self.connection.rows(statements.UNFINISHED):
             return False
+        names = self.names.all_of(name)
+        if self.moved(names) is not None:
+            return False
         traces = traces_of((name,))
         if traces is None:
             return True
-        return traces.journal in ("", location) and self.entries.history(self.names.all_of(name))
+        return traces.journal in ("", location) and self.entries.history(names)
+
+    def goes_on(self, traces: Traces, names: tuple[str, ...], location: str) -> bool:
+        """Return whether this still is the record of a controller, wherever it was moved.
+
+        Args:
+            traces: What was noted of it.
+            names: Of the controller.
+            location: Of this journal.
+        """
+        if not self.entries.history(names):
+            return False
+        if traces.newest is None or traces.journal == location:
+            return True
+        if self.entries.holds(*traces.newest):
+            return True
+        # Out of a shared journal an entry comes with another number and hash.
+        came = self.entries.came_from(traces.journal)
+        if came is not None and traces.newest[0] <= came[0]:
+            return True
+        # It was, until it was moved; the database refuses to write it here, and says where it is.
+        return self.moved(names) is not None
+
+    def moved(self, names: Sequence[str]) -> Moved | None:
+        """Return where the record under these names, or all of it, was moved; or comes from.
+
+        Args:
+            names: Of the controller; none for the journal as a whole.
+        """
+        if not self.connection.rows(self.connection.has_moves):
+            return None
+        return move_of(moves_in(self.connection), names)
 
     def damage(self, names: tuple[str, ...]) -> Iterator[str]:
         """Yield damage in what a change of a controller would rely on, in sentences.
@@ -96,6 +150,21 @@ class Tables:
                 yield from ChainCheck.before(row).problems_of(row)
 
 
+def _was_left(arriving: Moved, here: JournalPlace) -> bool:
+    """Return whether the journal that a record comes from is sealed, so that it counts here.
+
+    A process that was killed between the two seals leaves that to whoever opens the new one.
+    """
+    try:
+        there = Store(place_of(arriving.place), read_only=True, glance=True)
+        with closing(there), there.read() as tables:
+            moves = moves_in(tables.connection)
+    except JournalError:
+        return False  # moved_error says how to go on
+    same = (MoveState.MOVED, here.location, arriving.number, arriving.hash)
+    return any((move.state, move.place, move.number, move.hash) == same for move in moves)
+
+
 class Store:
     """Keeps one connection open and gives it to one thread at a time.
 
@@ -107,17 +176,33 @@ class Store:
         read_only: Whether nothing is written.
         glance: Whether a file that cannot be read soon, or only without what others are writing,
             counts as one that cannot be read.
+        arriving: Whether a journal that is still arriving is opened, to be filled anew.
     """
 
-    def __init__(self, place: JournalPlace, *, read_only: bool, glance: bool = False) -> None:
+    def __init__(
+        self,
+        place: JournalPlace,
+        *,
+        read_only: bool,
+        glance: bool = False,
+        arriving: bool = False,
+    ) -> None:
         self._place = place
         self._read_only = read_only
         self._glance = glance
+        self._arriving = arriving
         self._lock = runtime.reentrant_lock()
         self._backend: Backend | None = None
         self._tables: Tables | None = None
         self._file: tuple[int, int] | None = None
         self._failures: tuple[type[Exception], ...] = _OF_FILES
+        self._grown = False
+
+    def take_grown(self) -> bool:
+        """Return whether entries were added over this connection since this was asked last."""
+        with self._lock:
+            grown, self._grown = self._grown, False
+        return grown
 
     @property
     def durable(self) -> bool:
@@ -203,6 +288,7 @@ class Store:
                     raise
                 if writing:
                     connection.commit()
+                    self._grown = tables.entries.take_added() or self._grown
                 else:
                     connection.roll_back()
             except JournalError:
@@ -212,10 +298,22 @@ class Store:
                 self._drop()
                 raise damaged_error(str(error), self._place.name, consequence) from error
             except self._failures as error:
+                moves = self._moves_behind(error)
                 self._drop()
+                if moves:
+                    raise MovedRecordError(moves, self._place.name, consequence) from error
                 raise journal_error(error, self._place.name, consequence, then) from error
         if writing:
             checkpoint(Checkpoint.COMMIT, "after")
+
+    def _moves_behind(self, error: Exception) -> tuple[Moved, ...]:
+        """Return the moved records if the database refused to write one of them, else nothing."""
+        if self._tables is None or MOVED_WORDS not in str(error):
+            return ()
+        try:
+            return moves_in(self._tables.connection)
+        except self._failures:
+            return ()  # the database's own words are shown
 
     def _connected(self, *, to_write: bool) -> Tables:
         if self._backend is None:
@@ -258,7 +356,7 @@ class Store:
     def _bring_up_to_date(self, connection: DatabaseConnection) -> int:
         """Return the version of the tables; older ones that are only read stay as they are."""
         own, name = len(migrations.MIGRATIONS), self._place.name
-        found = migrations.stored_version(connection, name)
+        found = self._unsealed(connection, migrations.stored_version(connection, name))
         connection.roll_back()
         if found > own and not self._read_only:
             raise migrations.newer_error(name, found)
@@ -274,6 +372,27 @@ class Store:
         migrations.migrate(connection, found)
         connection.commit()
         return max(own, found)
+
+    def _unsealed(self, connection: DatabaseConnection, version: int) -> int:
+        """Return the version without a seal; a journal that has arrived is taken into use.
+
+        Raises:
+            JournalError: It is sealed, and not opened for reading only.
+        """
+        if version < SEALED or self._read_only:
+            return version % SEALED
+        connection.roll_back()
+        connection.run(connection.begin_migrating)
+        move = move_of(moves_in(connection), ())
+        if move is None:  # another process was faster
+            return migrations.stored_version(connection, self._place.name)
+        if move.state is MoveState.ARRIVING and self._arriving:
+            return version % SEALED
+        if move.state is MoveState.MOVED or not _was_left(move, self._place):
+            raise moved_error(move, self._place.name, tr("The command was not sent."))
+        take_into_use(connection)
+        connection.commit()
+        return version % SEALED
 
     def _file_now(self) -> tuple[int, int] | None:
         if self._place.path is None:

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 _NOBODY = 65534  # PostgreSQL refuses to run as root
@@ -44,11 +46,17 @@ class Server:
         self.execute(f"CREATE SCHEMA {name}")
         return f"{self.url()}?options=-csearch_path%3D{name}"
 
-    def execute(self, statement: str) -> None:
-        """Run one statement outside any journal."""
+    def empty_database(self) -> str:
+        """Return the URL of a new database."""
+        name = f"d{uuid4().hex}"
+        self.execute(f"CREATE DATABASE {name}")
+        return self.url(name)
+
+    def execute(self, statement: str, database: str = "postgres") -> None:
+        """Run statements outside any journal."""
         import psycopg
 
-        url = self.url().replace("+psycopg", "")
+        url = self.url(database).replace("+psycopg", "")
         with psycopg.connect(url, autocommit=True) as connection:
             connection.execute(statement.encode())
 
@@ -71,6 +79,12 @@ class Server:
         self.process.send_signal(2)
         self.process.wait(timeout=_START_S)
 
+    def crash(self) -> None:
+        """End it at once, so that it recovers at its next start."""
+        assert self.process is not None
+        self.process.send_signal(signal.SIGQUIT)
+        self.process.wait(timeout=_START_S)
+
     def _answers(self) -> bool:
         import psycopg
 
@@ -79,6 +93,21 @@ class Server:
         except psycopg.OperationalError:
             return False
         return True
+
+
+_connections: dict[str, Any] = {}
+
+
+def asked(url: str, query: str) -> list[tuple[Any, ...]]:
+    """Run statements outside any journal, over one connection for each database; return rows."""
+    import psycopg
+
+    known = _connections.get(url)
+    if known is None or known.closed:
+        known = psycopg.connect(url.replace("+psycopg", ""), autocommit=True)
+        _connections[url] = known
+    found = known.execute(query.encode())
+    return found.fetchall() if found.description else []
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import pytest
 from robolink.journal._journal import Journal
 from robolink.journal._places import place_of
 from robolink.journal.store.store import Store
-from tests.contract.journal._postgresql import Server, is_installed, served
+from tests.contract.journal._postgresql import Server, asked, is_installed, served
 
 Opener = Callable[..., Journal]
 
@@ -52,3 +52,16 @@ def open_anew() -> Iterator[Opener]:
 def journal(location: str, open_anew: Opener) -> Journal:
     """A new journal."""
     return open_anew(location)
+
+
+@pytest.fixture(scope="session")
+def plant_database(server: Server) -> str:
+    """The URL of the one database in which each test of copies has a plant."""
+    return server.empty_database()
+
+
+@pytest.fixture
+def plant(plant_database: str) -> str:
+    """The URL of a plant's empty database."""
+    asked(plant_database, "DROP SCHEMA IF EXISTS fleet CASCADE")
+    return plant_database

@@ -25,6 +25,18 @@ LATER = {
         "CREATE TABLE robots (\n\tname TEXT NOT NULL, \n\tcontroller TEXT NOT NULL, "
         "\n\tPRIMARY KEY (name)\n)",
     ),
+    4: (
+        "CREATE TABLE checks (number INTEGER NOT NULL, at TEXT NOT NULL, controller TEXT NOT "
+        "NULL, cell TEXT NOT NULL, well INTEGER NOT NULL, verdict TEXT NOT NULL, details TEXT NOT "
+        "NULL, operator TEXT NOT NULL, role TEXT NOT NULL, os_user TEXT NOT NULL, host TEXT NOT "
+        "NULL, nozzle TEXT NOT NULL, lot TEXT NOT NULL, recipe TEXT NOT NULL, recipe_hash TEXT "
+        "NOT NULL, station TEXT NOT NULL, version TEXT NOT NULL, hash TEXT NOT NULL, "
+        "PRIMARY KEY (number))",
+        "CREATE TABLE check_head (number INTEGER NOT NULL, closed INTEGER NOT NULL, "
+        "kept_from INTEGER NOT NULL, day TEXT NOT NULL)",
+        "CREATE INDEX checks_by_controller ON checks (controller, number)",
+        "INSERT INTO check_head (number, closed, kept_from, day) VALUES (0, 0, 1, '')",
+    ),
 }
 """The tables and columns that each later form adds."""
 ADDRESS = "epson+tcp://192.0.2.1:5000"

@@ -1,8 +1,9 @@
-"""journal list, show, diff, drift, export, verify: the record. Reads only, no controller."""
+"""journal list, show, checks, diff, drift, export, sync, verify, move: only move changes it."""
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 
@@ -10,6 +11,7 @@ import click
 
 from robolink.messages import declared, tr
 from robolink.model import EntryKind, json_fields
+from robolink_cli.commands.record.journal_checks import checks
 from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
     OfController,
@@ -17,8 +19,10 @@ from robolink_cli.commands.record.journal_lookup import (
     entries_named,
     entries_of_change,
     journal_to_read,
+    place_to_read,
 )
-from robolink_cli.console.exit_codes import DIFFERENT
+from robolink_cli.commands.record.journal_sync import PlantAnswer, asked_plant, sync
+from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import emit, emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import Overwrite
@@ -27,7 +31,7 @@ from robolink_cli.options.shared import json_option
 from robolink_cli.session.completion import complete_tool
 
 if TYPE_CHECKING:
-    from robolink.journal import Journal
+    from robolink.journal import ChainVerification, Journal
     from robolink.model import Recorded
 
 _KINDS: Final = {str(kind).replace(" ", "-"): kind for kind in EntryKind}
@@ -82,16 +86,22 @@ _BESIDES: Final = {
     "report": (
         "robolink_cli.commands.record.report:report",
         declared("Write one page about a tool change, from the journal, to keep or print."),
-    )
+    ),
+    "move": (
+        "robolink_cli.commands.record.journal_move:move",
+        declared("Move the journal to another file or database."),
+    ),
 }
 
 
 @click.group(cls=LazyGroup, lazy=_BESIDES)
 def journal() -> None:
-    """Read the record about tools: values, tests, people. Never changes it."""
+    """Read the record about tools: values, tests, people. Its entries never change."""
 
 
+journal.add_command(checks)
 journal.add_command(drift)
+journal.add_command(sync)
 
 
 @journal.command("list")
@@ -102,11 +112,11 @@ def list_entries(
     limit: Annotated[int, click.IntRange(min=1), CliOption(help="Show at most this many.")] = 20,
 ) -> None:
     """Show the newest entries, newest first."""
-    from robolink.journal import default_location, may_exist
+    from robolink.journal import may_exist
     from robolink_cli.views.journal import entry_payload, show_list
 
     wanted = meant.at_address()
-    location = default_location()
+    location = place_to_read(wanted.controller)
     if not may_exist(location):
         if json_is_on():
             emit_json("robolink/journal/1", {"entries": []})
@@ -114,7 +124,7 @@ def list_entries(
             say(tr("There is no journal yet at {location}.", location=location))
             say(tr("robolink creates it at the first change."))
         return
-    entries = list(wanted.of(journal_to_read(), limit=limit))
+    entries = list(wanted.of(journal_to_read(wanted.controller), limit=limit))
     if json_is_on():
         emit_json("robolink/journal/1", {"entries": [entry_payload(entry) for entry in entries]})
     else:
@@ -164,6 +174,11 @@ def export(
         CliOption("--format", help="Format of the file; default: by the ending of its name."),
     ] = None,
     force: Overwrite = False,
+    since: Annotated[
+        datetime | None,
+        click.DateTime(["%Y-%m-%d"]),
+        CliOption(metavar="YYYY-MM-DD", help="Only entries from this day on (UTC)."),
+    ] = None,
     meant: _Wanted,
 ) -> None:
     """Write entries to FILE, oldest first; all of them, or those that you choose."""
@@ -173,7 +188,9 @@ def export(
     written = form or form_of(file)
     require_free(file, replace=force)
     wanted = meant.at_address()
-    counted = Counted(wanted.of(journal_to_read(), newest_first=False))
+    begin = f"{since:%Y-%m-%d}" if since else ""
+    entries = wanted.of(journal_to_read(wanted.controller), newest_first=False)
+    counted = Counted(entry for entry in entries if entry.at >= begin)
     save_named(file, FORMATS[written](counted), replace=force)
     payload = {"file": str(file), "format": written, "entry_count": counted.count}
     if json_is_on():
@@ -187,35 +204,55 @@ def export(
 def verify() -> int:
     """Check that no entry was changed and none is missing; exit code 1 otherwise.
 
+    Checks of cells stand outside the chain; of those that are kept, each day is compared with its
+    entry in the chain.
+
     The chain of hashes has no key. It shows changes of single entries by a disk, a program or a
-    person. It cannot show that somebody with access to the whole journal rebuilt all of it, or
-    removed the newest entries and reset the note of the last one: for that, keep the number and
-    hash that this prints where that person cannot write, and compare.
+    person. That somebody with access to the whole journal rebuilt all of it, or removed the newest
+    entries and reset the note of the last one, shows only by a copy that this person cannot change:
+    where the plant's database is named, this compares with it (exit code 3 if that does not
+    answer). Otherwise keep the number and hash that this prints elsewhere, and compare.
     """
     opened = journal_to_read()
     with _progress(opened) as progress:
         found = opened.verify(progress)
-    said_of = ("problems", "last_number", "last_hash")
-    payload = {"entry_count": found.checked, **json_fields(found, *said_of), "keyed": False}
-    if json_is_on():
-        emit_json("robolink/journal-verified/1", payload)
+    answer = asked_plant(opened)
+    problems = (*found.problems, *(answer.problems if answer else ()))
+    payload = {
+        "entry_count": found.checked,
+        "problems": list(problems),
+        **json_fields(found, "last_number", "last_hash"),
+        "keyed": False,
+        "plant": answer.payload() if answer else None,
+    }
+    emit("journal-verified", payload, lambda: _show_verified(found, answer))
+    if problems:
+        return DIFFERENT
+    return exit_code(answer.error) if answer and answer.error else 0
+
+
+def _show_verified(found: "ChainVerification", answer: PlantAnswer | None) -> None:
+    for problem in (*found.problems, *(answer.problems if answer else ())):
+        say(problem)
+    said = tr("problems: {count}", count=len(found.problems))
+    whole = tr("nothing was changed and nothing is missing")
+    end = said if found.problems else whole
+    say(tr("{count} entries checked: {end}.", count=found.checked, end=end))
+    if answer is not None:
+        say(answer.sentence())
+    if not found.last_number:
+        return
+    last = {"number": found.last_number, "hash": found.last_hash}
+    if answer is not None and answer.witness is not None and answer.witness.number:
+        say(tr("Last entry: {number}, {hash}.", **last))
     else:
-        for problem in found.problems:
-            say(problem)
-        said = tr("problems: {count}", count=len(found.problems))
-        whole = tr("nothing was changed and nothing is missing")
-        end = said if found.problems else whole
-        say(tr("{count} entries checked: {end}.", count=found.checked, end=end))
-        if found.last_number:
-            say(
-                tr(
-                    "The last one is {number}, {hash}. Without a key this cannot detect a "
-                    "rebuilt journal: compare the hash with one kept elsewhere.",
-                    number=found.last_number,
-                    hash=found.last_hash,
-                )
+        say(
+            tr(
+                "The last one is {number}, {hash}. Without a key this cannot detect a "
+                "rebuilt journal: compare the hash with one kept elsewhere.",
+                **last,
             )
-    return DIFFERENT if found.problems else 0
+        )
 
 
 @contextmanager

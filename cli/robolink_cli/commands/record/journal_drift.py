@@ -16,6 +16,7 @@ from robolink_cli.commands.record.journal_lookup import (
     cell_meant,
     controller_meant,
     journal_to_read,
+    place_to_read,
 )
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say, table
@@ -62,7 +63,7 @@ def drift(
     Nozzles that wear, mounts that slip, pins that moved, an unusual last change. Only changes that
     were measured and kept count. Exit code 1 when something is unusual.
     """
-    from robolink.journal import default_location, may_exist
+    from robolink.journal import may_exist
 
     if page is not None:
         from robolink.files.named import require_free
@@ -71,8 +72,8 @@ def drift(
     meant = controller_meant(controller)
     begin = f"{since:%Y-%m-%d}" if since else ""
     cells: list[CellDrift] = []
-    if may_exist(default_location()):
-        cells = _cells(journal_to_read(), meant, tool=tool, since=begin, baseline=baseline)
+    if may_exist(place_to_read(meant)):
+        cells = _cells(journal_to_read(meant), meant, tool=tool, since=begin, baseline=baseline)
     if page is not None and cells:
         _write(cells, page, replace=force)
     if json_is_on():

@@ -23,15 +23,28 @@ _LONGEST_NUMBER: Final = 18
 _NAMED: Final = 5
 
 
-def journal_to_read() -> "Journal":
-    """Open the journal for reading.
+def journal_to_read(address: str | None = None) -> "Journal":
+    """Open the journal for reading, where environment and cell files say that it is.
+
+    Args:
+        address: Of the controller that it is about; by default the one of the line, else all.
 
     Raises:
         JournalError: There is none yet, or it cannot be read.
+        ConfigError: A cell file is wrong, and one names a journal.
     """
     from robolink.journal import open_journal
 
-    return open_journal(read_only=True)
+    return open_journal(place_to_read(address), read_only=True)
+
+
+def place_to_read(address: str | None = None) -> str:
+    """Return where the journal is by environment and cell files; see :func:`journal_to_read`."""
+    from robolink.config import use_journals_of_files
+    from robolink.journal import default_location
+
+    use_journals_of_files()
+    return default_location(address or controller_meant(None) or "")
 
 
 OfController = Annotated[

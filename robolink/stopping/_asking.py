@@ -4,9 +4,9 @@ import json
 import os
 import socket
 import time
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Mapping, Set
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -23,6 +23,9 @@ MOST_BYTES: Final = 65_536
 
 _TAKEN_S: Final = 1.0
 """Longest wait for a process to accept the request, in s; a slower one is of no use."""
+
+_AGAIN_S: Final = 0.05
+"""Pause between two looks at who has a controller, in s."""
 
 _RESTS_S: Final = 8.0
 """Longest wait for the end of an accepted stop, in s: five seconds to stop, plus the exchanges."""
@@ -53,6 +56,9 @@ class ControllerHolder:
         controller: Which controller that is, as it said of itself; empty where it did not.
         card: The file that says so.
         look: Where to look at what it saw last; ``None`` where it lets nobody look.
+        since: Since when it has the controller, as a label; empty where it did not say.
+        process: Which process it is, as :class:`robolink.journal.LeaseHolder` takes it.
+        brief: Whether it has the controller for a moment only, to check it.
     """
 
     place: str | tuple[str, int]
@@ -62,6 +68,9 @@ class ControllerHolder:
     controller: str
     card: Path
     look: str | tuple[str, int] | None = None
+    since: str = ""
+    process: Mapping[str, object] = field(default_factory=dict, hash=False)
+    brief: bool = False
 
     def last_seen(self) -> LastSeen | None:
         """Return its last reading of its controller; ``None`` if it has none yet.
@@ -165,24 +174,43 @@ class HolderGoneError(Exception):
         self.pid = pid
 
 
-def holders_of(keys: Set[str]) -> Iterator[ControllerHolder]:
+def holders_of(keys: Set[str], *, others: bool = False) -> Iterator[ControllerHolder]:
     """Yield the processes on this computer that have a controller, the latest first.
 
     Args:
         keys: Its far end (:func:`~robolink.transport.far_end_of`), and its own name where that is
             known.
+        others: Whether this process does not count.
 
     What a process that is gone has left is taken away.
     """
-    folder = state_folder(KIND)
+    folder, own = state_folder(KIND), f"{os.getpid()}-"
     try:
-        cards = [Path(entry) for entry in os.scandir(folder) if entry.name.endswith(".json")]
+        cards = [
+            Path(entry)
+            for entry in os.scandir(folder)
+            if entry.name.endswith(".json") and not (others and entry.name.startswith(own))
+        ]
     except OSError:
         return
     for card in sorted(cards, key=_age):
         holder = _read(card, keys)
         if holder is not None:
             yield holder
+
+
+def await_brief_holders(keys: Set[str], *, within_s: float) -> None:
+    """Wait until no other process has a controller for a moment only, to check it.
+
+    Whoever then finds it taken was kept out by somebody who works there.
+
+    Args:
+        keys: As for :func:`holders_of`.
+        within_s: Longest wait.
+    """
+    until = time.monotonic() + within_s
+    while any(one.brief for one in holders_of(keys, others=True)) and time.monotonic() < until:
+        time.sleep(_AGAIN_S)
 
 
 def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
@@ -193,8 +221,9 @@ def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
             return None
         if _is_gone(pid):
             card.unlink()
-            for suffix in (".sock", ".look"):
-                card.with_suffix(suffix).unlink(missing_ok=True)
+            for left in (card.with_suffix(".sock"), card.with_suffix(".look"), _shared(place)):
+                if left.parent == card.parent:
+                    left.unlink(missing_ok=True)
             return None
         look = said.get("look")
         return ControllerHolder(
@@ -205,9 +234,17 @@ def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
             str(said.get("controller", "")),
             card,
             None if look is None else _place(look),
+            str(said.get("since", "")),
+            dict(said.get("process", {})),
+            brief=said.get("brief") is True,
         )
     except (OSError, ValueError, TypeError, KeyError, IndexError, RecursionError):
         return None
+
+
+def _shared(place: object) -> Path:
+    """Return the socket that a card names, which other cards may name too; else no file."""
+    return Path(place) if isinstance(place, str) else Path()
 
 
 def _place(said: object) -> str | tuple[str, int]:

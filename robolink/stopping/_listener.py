@@ -18,8 +18,8 @@ import selectors
 import socket
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Protocol
@@ -28,9 +28,10 @@ from robolink import runtime
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
 from robolink.interrupts import ClosedAtExit
+from robolink.journal import this_process
 from robolink.model import ControllerStatus, is_own_name
 from robolink.plug_ins import unexpected
-from robolink.timing import NS_PER_S
+from robolink.timing import NS_PER_S, wall_label
 from robolink.transport import far_end_of
 
 KIND: Final = "holders"
@@ -108,27 +109,18 @@ class StopListener(ClosedAtExit):
         self._controller = controller
         self._heard = heard
         self._seen = seen
-        token = runtime.random_bytes(16).hex()
-        folder = state_folder(KIND)
-        make_folder(folder)
-        file = f"{os.getpid()}-{token[:8]}"
-        own = name if is_own_name(name) else ""
-        self._card = folder / f"{file}.json"
-        self._servers = [_LocalServer(folder / f"{file}.sock", token, self._stop, "robolink-stop")]
-        card: dict[str, object] = {
-            "keys": sorted(far_end_of(url) | ({own} if own else set())),
-            "controller": own,
-            "place": self._servers[0].place,
-            "token": token,
-            "pid": os.getpid(),
-            "who": who,
-        }
+        token = _new_token()
+        path = _path_of(token)
+        self._card = path.with_suffix(".json")
+        stop = _LocalServer(path.with_suffix(".sock"), {token: self._stop}, "robolink-stop")
+        self._servers = [stop]
+        card = _card(url, name, who, token, stop.place)
         try:
             if seen is not None:
-                look = _LocalServer(folder / f"{file}.look", token, self._show, "robolink-look")
+                look = _LocalServer(path.with_suffix(".look"), {token: self._show}, "robolink-look")
                 self._servers.append(look)
                 card["look"] = look.place
-            self._publish(card)
+            _publish(self._card, card)
         except BaseException:
             self._end_servers()
             raise
@@ -142,14 +134,6 @@ class StopListener(ClosedAtExit):
         for server in self._servers:
             server.close()
 
-    def _publish(self, card: dict[str, object]) -> None:
-        """Write the address to contact; not synced to the disk: it ends with the process."""
-        draft = self._card.with_suffix(".new")
-        descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with open(descriptor, "w", encoding="utf-8") as file:
-            json.dump(card, file)
-        os.replace(draft, self._card)
-
     def _show(self, caller: socket.socket, _asked: dict[str, object]) -> None:
         found = self._seen() if self._seen else None
         if found is None:
@@ -158,23 +142,138 @@ class StopListener(ClosedAtExit):
             _tell(caller, {"status": asdict(found[0]), "age_s": found[1] / NS_PER_S})
 
     def _stop(self, caller: socket.socket, asked: dict[str, object]) -> None:
-        _tell(caller, {"taken": True})
+        _stopped(self._controller, self._heard, caller, asked)
+
+
+class SharedStopListener(ClosedAtExit):
+    """Listens at one socket for stops of many controllers, each of which is held for a moment.
+
+    For a process that looks at many cells at once: a socket and a thread for each would cost more
+    than the look. Each request is answered in a thread of its own, so that no stop waits for
+    another. A context manager.
+
+    Args:
+        who: Who holds the controllers, and for what, as a person is told.
+        heard: Called with the URL and with who asked, after a stop; what it raises is lost.
+
+    Raises:
+        OSError: There is no place to listen.
+
+    Example:
+        >>> from robolink.controllers import SimpleController
+        >>> from robolink.stopping import SharedStopListener, holders_of
+        >>> from robolink.transport import far_end_of
+        >>> url = "epson+tcp://192.168.0.1:5000"
+        >>> with SharedStopListener(who="the nightly check") as listener:
+        ...     with SimpleController(identity=url) as controller:
+        ...         with listener.listening(controller, url):
+        ...             [holder.who for holder in holders_of(far_end_of(url))]
+        ['the nightly check']
+    """
+
+    def __init__(self, *, who: str = "", heard: Callable[[str, str], None] | None = None) -> None:
+        self._who, self._heard = who, heard
+        self._answers: dict[str, Answer] = {}
+        path = _path_of(_new_token()).with_suffix(".sock")
+        self._server = _LocalServer(path, self._answers, "robolink-stop", apart=True)
+
+    def close(self) -> None:
+        """Stop listening. Idempotent."""
+        self._server.close()
+
+    @contextmanager
+    def listening(self, controller: Stoppable, url: str, *, name: str = "") -> Iterator[None]:
+        """Hear stops of one more controller for the block.
+
+        Leave it before the controller is closed; a stop in progress then goes on to its end.
+
+        Args:
+            controller: What is stopped.
+            url: How it was reached.
+            name: Under which name it is on record; empty where that is not known.
+
+        Raises:
+            OSError: Its address cannot be left for others.
+
+        Example:
+            >>> from robolink.controllers import SimpleController
+            >>> from robolink.stopping import SharedStopListener
+            >>> url = "epson+tcp://192.168.0.1:5000"
+            >>> with SharedStopListener() as listener, SimpleController(identity=url) as controller:
+            ...     with listener.listening(controller, url, name="epson:C-1/R-1"):
+            ...         controller.status().ready
+            True
+        """
+        heard = self._heard
+        token, told = _new_token(), None if heard is None else lambda who: heard(url, who)
+        card = _path_of(token).with_suffix(".json")
+        self._answers[token] = lambda caller, asked: _stopped(controller, told, caller, asked)
         try:
-            self._controller.stop()
-            _tell(caller, {"state": str(self._controller.status().state)})
-        except RobolinkError as error:
-            _tell(
-                caller,
-                {"error": type(error).__name__, "what": error.what, "remedy": error.remedy},
-            )
-        except Exception as error:
-            what = unexpected(error)
-            _tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
-        # Last, because a blocked console must not delay a stop. If it fails, nothing ends: the
-        # result of the stop has been sent, and the next request must be heard.
-        with suppress(Exception):
-            if self._heard:
-                self._heard(str(asked.get("who", "")))
+            _publish(card, _card(url, name, self._who, token, self._server.place) | {"brief": True})
+            yield
+        finally:
+            card.unlink(missing_ok=True)
+            del self._answers[token]
+
+
+def _new_token() -> str:
+    return runtime.random_bytes(16).hex()
+
+
+def _path_of(token: str) -> Path:
+    """Return the path of the files of one listener, without their endings; makes the folder."""
+    folder = state_folder(KIND)
+    make_folder(folder)
+    return folder / f"{os.getpid()}-{token[:8]}"
+
+
+def _card(url: str, name: str, who: str, token: str, place: object) -> dict[str, object]:
+    own = name if is_own_name(name) else ""
+    return {
+        "keys": sorted(far_end_of(url) | ({own} if own else set())),
+        "controller": own,
+        "place": place,
+        "token": token,
+        "pid": os.getpid(),
+        "who": who,
+        "process": asdict(this_process()),
+        "since": wall_label(),
+    }
+
+
+def _publish(path: Path, card: dict[str, object]) -> None:
+    """Write the address to contact; not synced to the disk: it ends with the process."""
+    draft = path.with_suffix(".new")
+    descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with open(descriptor, "w", encoding="utf-8") as file:
+        json.dump(card, file)
+    os.replace(draft, path)
+
+
+def _stopped(
+    controller: Stoppable,
+    heard: Callable[[str], None] | None,
+    caller: socket.socket,
+    asked: dict[str, object],
+) -> None:
+    """Stop a controller, and tell the caller how that ended."""
+    _tell(caller, {"taken": True})
+    try:
+        controller.stop()
+        _tell(caller, {"state": str(controller.status().state)})
+    except RobolinkError as error:
+        _tell(
+            caller,
+            {"error": type(error).__name__, "what": error.what, "remedy": error.remedy},
+        )
+    except Exception as error:
+        what = unexpected(error)
+        _tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
+    # Last, because a blocked console must not delay a stop. If it fails, nothing ends: the
+    # result of the stop has been sent, and the next request must be heard.
+    with suppress(Exception):
+        if heard:
+            heard(str(asked.get("who", "")))
 
 
 class _LocalServer(ClosedAtExit):
@@ -182,16 +281,19 @@ class _LocalServer(ClosedAtExit):
 
     Args:
         path: Where to listen, if that can be.
-        token: What opens it.
-        answer: What is answered; it raises nothing.
+        answers: What is answered to each token that opens it; they raise nothing. Others may be
+            added meanwhile.
         name: Of the thread.
+        apart: Whether each request gets a further thread, so that none waits for another.
 
     Raises:
         OSError: There is no place to listen.
     """
 
-    def __init__(self, path: Path, token: str, answer: Answer, name: str) -> None:
-        self._token, self._answer = token, answer
+    def __init__(
+        self, path: Path, answers: Mapping[str, Answer], name: str, *, apart: bool = False
+    ) -> None:
+        self._answers, self._apart = answers, apart
         self._socket, self._path = _listening(path)
         self._wake, self._awake = socket.socketpair()
         self._thread = threading.Thread(target=self._listen, name=name, daemon=True)
@@ -220,17 +322,24 @@ class _LocalServer(ClosedAtExit):
             while self._awake not in [key.fileobj for key, _ in selector.select()]:
                 with suppress(OSError):  # the caller has left
                     caller, _ = self._socket.accept()
-                    with caller:
+                    if self._apart:
+                        name = f"{self._thread.name} answer"
+                        threading.Thread(
+                            target=self._hear, args=(caller,), name=name, daemon=True
+                        ).start()
+                    else:
                         self._hear(caller)
 
     def _hear(self, caller: socket.socket) -> None:
-        asked = _read_line(caller)
         from hmac import compare_digest  # imported here, because most commands never get a request
 
-        # As bytes: for text that is not ASCII it raises an error that would end the listener.
-        shown = str(asked.get("token", "")).encode("utf-8", "surrogatepass")
-        if compare_digest(shown, self._token.encode()):
-            self._answer(caller, asked)
+        with suppress(OSError), caller:  # the caller has left
+            asked = _read_line(caller)
+            # As bytes: for text that is not ASCII it raises an error that would end the listener.
+            shown = str(asked.get("token", "")).encode("utf-8", "surrogatepass")
+            for token, answer in list(self._answers.items()):
+                if compare_digest(shown, token.encode()):
+                    answer(caller, asked)
 
 
 def _tell(caller: socket.socket, answer: dict[str, object]) -> None:

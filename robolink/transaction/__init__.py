@@ -10,6 +10,7 @@ from robolink.transaction._orders import (
     DoneOrder,
     Order,
     carrying_out,
+    finish_order,
     plain_result,
     require_order_id,
 )
@@ -45,6 +46,7 @@ __all__ = [
     "change_tools",
     "changed_since",
     "earlier_corrections",
+    "finish_order",
     "id_of_change",
     "last_proof",
     "look",

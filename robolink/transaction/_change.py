@@ -95,6 +95,7 @@ class ToolChange:
         tell: Told, in sentences, what was restored.
         order: The order that it carries out; with the values it is kept that this is done.
         describe: Makes the result of the order from what was written.
+        select: The tool to select once all are written; ``None`` to leave that as it is.
         wait_s: How long the block, and then :meth:`write`, waits for other threads and programs
             that are at work, in seconds, 0 not at all; ``None`` for the controller's
             ``patience.wait_s``.
@@ -119,6 +120,7 @@ class ToolChange:
         tell: Callable[[str], None] = lambda _sentence: None,
         order: Order | None = None,
         describe: Describe = plain_result,
+        select: int | None = None,
         wait_s: float | None = None,
     ) -> None:
         self._controller = controller
@@ -128,8 +130,9 @@ class ToolChange:
                 raise not_of_class(f"wanted[{number}]", one, Wanted)
         # An order counts as carried out in the transaction that keeps the value, which requires a
         # change that is open until then.
-        self._several_steps = verify or len(self._wanted) > 1 or order is not None
-        self._ordered = None if order is None else OrderedChange(order, describe)
+        self._several_steps = verify or len(self._wanted) != 1 or order is not None
+        self._ordered = None if order is None else OrderedChange(order, describe, select)
+        self._select = select
         self._verify = verify
         self._marked = marked or {}
         self._tell = tell
@@ -221,6 +224,8 @@ class ToolChange:
                     self._signs_of_life.enter_context(self._controller.signs_of_life())
             for wanted, step in zip(self._wanted, steps, strict=True):
                 self._receipts += (self._write(wanted, step),)
+            if self._select is not None and self._controller.tools.selected() != self._select:
+                self._controller.tools.select(self._select)
             return self._receipts
 
     def keep(self, verdict: str = "") -> None:
@@ -271,6 +276,8 @@ class ToolChange:
     @property
     def request(self) -> str:
         """What is done, for display."""
+        if not self._wanted:
+            return tr("selecting tool {tool}", tool=self._select)
         numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)
         return tr("change of tool {numbers}", numbers=numbers)
 
@@ -312,9 +319,14 @@ class ToolChange:
 
     def _selected_before(self, steps: list[Step]) -> int | None:
         """Return the selected tool if this change, or restoring it, may need to know it."""
-        clears = any(wanted.then_select is not None for wanted in self._wanted)
         defines = any(step.before is None and step.requested is not None for step in steps)
-        return self._controller.tools.selected() if clears or defines else None
+        return self._controller.tools.selected() if self._selects or defines else None
+
+    @property
+    def _selects(self) -> bool:
+        """Whether it may select another tool than was selected before."""
+        clears = any(wanted.then_select is not None for wanted in self._wanted)
+        return clears or self._select is not None
 
     def _differs(self, step: Step) -> bool:
         return not self._controller.tools.same(step.before, step.requested)
@@ -370,8 +382,8 @@ class ToolChange:
                 yield step
 
     def _select_again(self) -> None:
-        """Select the tool again that gave way to a clear of this change."""
-        if not any(wanted.then_select is not None for wanted in self._wanted):
+        """Select the tool again that this change selected another one for."""
+        if not self._selects:
             return
         tools, before = self._controller.tools, self._selected
         try:
@@ -439,6 +451,7 @@ def change_tools(
     tell: Callable[[str], None] = lambda _sentence: None,
     order: Order | None = None,
     describe: Describe = plain_result,
+    select: int | None = None,
     wait_s: float | None = None,
 ) -> tuple[ToolReceipt, ...]:
     """Write tools without a turn test: all of them, or none.
@@ -449,6 +462,7 @@ def change_tools(
         tell: Told what was restored.
         order: The order that this carries out (:func:`robolink.transaction.carrying_out`).
         describe: Makes the result of the order from what was written.
+        select: The tool to select once all are written; ``None`` to leave that as it is.
         wait_s: As for :class:`ToolChange`.
 
     Raises:
@@ -464,7 +478,13 @@ def change_tools(
         5.0
     """
     change = ToolChange(
-        controller, wanted, tell=tell, order=order, describe=describe, wait_s=wait_s
+        controller,
+        wanted,
+        tell=tell,
+        order=order,
+        describe=describe,
+        select=select,
+        wait_s=wait_s,
     )
     with controller.latch.watching(change.request), change:
         receipts = change.write()

@@ -3,16 +3,20 @@
 A queue that delivers at least once gives each job an id. That id stands in the journal beside the
 change, in the very transaction that keeps it, so that there is no instant at which a value stays
 and its order does not count as carried out. It is looked up under the lease, before anything is
-moved or sent (docs/commands.md).
+moved or sent (docs/commands.md). An order that ended otherwise, because a person, a limit or the
+controller said no, stands there too: delivering it again is nobody's decision to try again.
 """
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
 from typing import Final
 
-from robolink.errors import ConfigError, ToolChangedError
+from robolink.errors import ConfigError, RobolinkError, ToolChangedError
+from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.model import (
     Controller,
@@ -28,6 +32,7 @@ from robolink.model import (
     read_for_verdict,
     read_offset,
 )
+from robolink.transaction._order_ends import anew, as_before, end_of, only_the_moment
 from robolink.transaction._put_back import Step
 
 LONGEST_ORDER: Final = 64
@@ -74,10 +79,12 @@ class OrderedChange:
     Attributes:
         order: The order.
         describe: Makes its result from what was written.
+        selects: The tool that it leaves selected; ``None`` where it leaves that as it is.
     """
 
     order: Order
     describe: Describe
+    selects: int | None = None
 
     def kept(self, receipts: Sequence[ToolReceipt]) -> NewEntry:
         """Return the entry that makes the order count as carried out."""
@@ -98,7 +105,12 @@ class OrderedChange:
 
     def _said(self, receipts: Sequence[ToolReceipt]) -> dict[str, object]:
         result = dict(self.describe(receipts))
-        return {"order": self.order.id, "job": dict(self.order.job), "result": result}
+        said: dict[str, object] = {
+            "order": self.order.id,
+            "job": dict(self.order.job),
+            "result": result,
+        }
+        return said if self.selects is None else {**said, "selects": self.selects}
 
 
 def plain_result(receipts: Sequence[ToolReceipt]) -> dict[str, object]:
@@ -137,8 +149,11 @@ def carrying_out(
     """Keep the lease, look the order up, and record its id with all that is done for it.
 
     Where :attr:`Order.done` says that it was carried out before, nothing is to be done; else the
-    order goes with the change: :class:`ToolChange`, :func:`change_tools` and
-    :class:`robolink.calibration_run.NozzleChange` take it.
+    order goes with the change: :class:`ToolChange`, :func:`change_tools`, :func:`undo` and
+    :class:`robolink.calibration_run.NozzleChange` take it, and :func:`finish_order` what writes
+    no tool. If the block raises before that, how it ended is on record, and the next delivery
+    raises the same kind of error. Not so where only the moment was wrong: the controller was not
+    reached or was busy, the journal could not be used, or an outcome is unknown.
 
     Args:
         controller: The controller, connected.
@@ -147,10 +162,12 @@ def carrying_out(
         wait_s: How long to wait for other threads and programs, as :class:`ToolChange` does.
 
     Raises:
-        BusyError: Another process is changing this controller.
+        BusyError: Another process is changing this controller, or has it and is silent.
         ConfigError: The id is none, or the order is not to be carried out again: it was another
-            job, or what it did was taken back, or closed on a person's word.
-        ToolChangedError: A tool that it wrote holds another value since.
+            job, or what it did was taken back, or closed on a person's word, or the file that it
+            wrote is gone or changed.
+        RobolinkError: It ended before without a kept change, with an error of this kind.
+        ToolChangedError: A tool that it wrote, or the selected one, is another since.
         OutcomeUnknownError: An earlier job is unfinished, perhaps this very order, or what was
             in force before it and is not put back.
 
@@ -171,6 +188,7 @@ def carrying_out(
     require_order_id(order)
     outcomes, purpose = controller.outcomes, tr("order {order}", order=order)
     plain = json.loads(json.dumps(job))
+    outcomes.refuse_holder(silent=True)  # what it left is for a person to judge, not for a queue
     with (
         controller.procedure(purpose, wait_s=wait_s),
         outcomes.hold(purpose),
@@ -186,8 +204,52 @@ def carrying_out(
         outcomes.order = order
         try:
             yield Order(order, plain)
+        except (Exception, KeyboardInterrupt) as error:
+            _record_end(controller, order, plain, error)
+            raise
         finally:
             outcomes.order = ""
+
+
+def finish_order(
+    controller: Controller,
+    order: Order,
+    result: Mapping[str, object],
+    *,
+    files: Mapping[Path, bytes] | None = None,
+) -> None:
+    """Record that an order is carried out which writes no tool.
+
+    Args:
+        controller: The controller, inside :func:`carrying_out`.
+        order: The order.
+        result: What is reported when it is delivered again, plain JSON.
+        files: What it leaves in which files. Call this before they are written: a file without
+            its order would be in the way of a second delivery.
+
+    Raises:
+        ConfigError: It cannot be recorded.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import robolink
+        >>> from robolink.transaction import carrying_out, finish_order
+        >>> note = Path("note.txt")
+        >>> with robolink.connect("epson+sim://finish-example") as controller:
+        ...     for delivery in (1, 2):
+        ...         with carrying_out(controller, "J-1008", {"note": "tools"}) as order:
+        ...             if order.done is None:
+        ...                 finish_order(controller, order, {}, files={note: b"seen"})
+        ...                 _ = note.write_bytes(b"seen")
+        ...             print(delivery, order.done is not None)
+        1 False
+        2 True
+    """
+    kept = OrderedChange(order, lambda _none: result).kept(())
+    if files:
+        digests = {str(path.absolute()): _digest(data) for path, data in files.items()}
+        kept = NewEntry(kept.kind, verdict=kept.verdict, details={**kept.details, "files": digests})
+    controller.outcomes.append(kept)
 
 
 def order_of(marker: Marker) -> str:
@@ -243,6 +305,8 @@ def _done(
     """
     if entry.details.get("job") != job:
         raise _refused(tr("Order {order} was given before, for another job.", order=order))
+    if isinstance(ended := entry.details.get("ended"), dict):
+        raise as_before(order, entry.at, ended)
     if entry.details.get("forgotten"):
         raise _refused(
             tr("Order {order} was closed without checking how it ended.", order=order),
@@ -266,10 +330,71 @@ def _done(
                     left=describe_offset(left),
                     now=describe_offset(now),
                 ),
-                remedy=_anew(),
+                remedy=anew(),
                 controller=controller.identity,
             )
+    _require_selected(controller, order, entry)
+    _require_files(order, entry)
     return DoneOrder(entry.change, entry.at, result)
+
+
+def _require_selected(controller: Controller, order: str, entry: Recorded) -> None:
+    left = entry.details.get("selects")
+    if left is not None and (now := controller.tools.selected()) != left:
+        raise ToolChangedError(
+            tr(
+                "Order {order} left tool {left} selected; tool {now} is selected now.",
+                order=order,
+                left=left,
+                now=now,
+            ),
+            remedy=anew(),
+            controller=controller.identity,
+        )
+
+
+def _require_files(order: str, entry: Recorded) -> None:
+    files = entry.details.get("files")
+    for path, digest in files.items() if isinstance(files, dict) else ():
+        try:
+            found = _digest(read_named(Path(path)))
+        except OSError as error:
+            raise _refused(
+                tr(
+                    "Order {order} wrote {path}, which cannot be read now: {cause}.",
+                    order=order,
+                    path=path,
+                    cause=error.strerror or error,
+                )
+            ) from error
+        if found != digest:
+            raise _refused(
+                tr("Order {order} wrote {path}, which was changed since.", order=order, path=path)
+            )
+
+
+def _digest(data: bytes) -> str:
+    return sha256(data).hexdigest()
+
+
+def _record_end(
+    controller: Controller, order: str, job: Mapping[str, object], error: BaseException
+) -> None:
+    """Record that an order ended without a kept change, unless its change was kept before."""
+    if only_the_moment(error):
+        return
+    details = {"order": order, "job": dict(job), "ended": end_of(error)}
+    outcomes = controller.outcomes
+    try:
+        with controller.uninterrupted():
+            if _found(outcomes, order) is None:
+                verdict = tr("order ended without a kept change")
+                outcomes.append(NewEntry(EntryKind.ORDER, verdict=verdict, details=details))
+    except RobolinkError:
+        if isinstance(error, RobolinkError):
+            error.say_what_stands(
+                tr("robolink could not record how order {order} ended.", order=order)
+            )
 
 
 def _taken_back(outcomes: OutcomeLog, kept: Recorded) -> bool:
@@ -285,8 +410,4 @@ def _taken_back(outcomes: OutcomeLog, kept: Recorded) -> bool:
 
 
 def _refused(what: str) -> ConfigError:
-    return ConfigError(what, remedy=_anew())
-
-
-def _anew() -> str:
-    return tr("Nothing was moved or written. Give a new order if the work must be done again.")
+    return ConfigError(what, remedy=anew())

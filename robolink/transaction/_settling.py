@@ -327,7 +327,7 @@ class Recovery:
         left: What takes a person's word, and did not get it.
     """
 
-    json_version: ClassVar[int] = 3
+    json_version: ClassVar[int] = 5
     settled: tuple[Finding, ...]
     left: tuple[Finding, ...]
 

@@ -29,6 +29,7 @@ from robolink.model import (
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label
 from robolink.transaction._change import Wanted, change_tools
+from robolink.transaction._orders import Describe, Order, finish_order, plain_result
 from robolink.transaction._put_back import Step
 
 
@@ -320,6 +321,8 @@ def undo(
     *,
     then_select: int | None = None,
     tell: Callable[[str], None] = lambda _sentence: None,
+    order: Order | None = None,
+    describe: Describe = plain_result,
 ) -> Undone:
     """Write the old values: all of them, or none. The same tool stays selected.
 
@@ -329,6 +332,8 @@ def undo(
         then_select: The tool to select in place of one that is in force and becomes
             undefined; without it that is refused.
         tell: Told what was restored when it fails on the way.
+        order: The order that this carries out (:func:`robolink.transaction.carrying_out`).
+        describe: Makes the result of the order from what was written.
 
     Raises:
         NotAllowedError: It takes an engineer; nothing was sent.
@@ -346,6 +351,8 @@ def undo(
         None
     """
     if not plan.steps:
+        if order is not None:
+            finish_order(controller, order, describe(()))
         return Undone("", ())
     with controller.procedure(plan.sentence):
         # Checked before the decision is recorded.
@@ -368,9 +375,25 @@ def undo(
                     jump = controller.change_guard.beyond(step.before, step.requested)
                     if jump is not None:
                         accepted.enter_context(controller.change_guard.accepting(step.tool, jump))
-                return Undone(change, change_tools(controller, wanted, tell=tell))
+                receipts = change_tools(
+                    controller,
+                    wanted,
+                    tell=tell,
+                    order=order,
+                    describe=describe,
+                    select=_gives_way(controller, plan, then_select),
+                )
+                return Undone(change, receipts)
         finally:
             outcomes.change = ""
+
+
+def _gives_way(controller: Controller, plan: UndoPlan, then_select: int | None) -> int | None:
+    """Return the tool that is selected in place of one that becomes undefined, if one does."""
+    cleared = [step.tool for step in plan.steps if step.requested is None]
+    if then_select is None or controller.tools.selected() not in cleared:
+        return None
+    return then_select
 
 
 def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:

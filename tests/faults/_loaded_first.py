@@ -13,7 +13,6 @@ import pkgutil
 import _pytest.config  # the main module of a test run imports it, in each fork anew
 import rich.console
 import rich.table
-import robolink_cli.access.password
 import robolink_cli.commands.controller.jog
 import robolink_cli.commands.measure.calibrate
 import robolink_cli.commands.record.recover
@@ -23,6 +22,7 @@ import robolink_cli.stopping.notes
 import robolink_simulators.cell.clock
 import robolink_simulators.control.assist
 
+import robolink.config.passwords
 import robolink.controllers
 import robolink.journal
 import robolink.stopping

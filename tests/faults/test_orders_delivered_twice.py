@@ -6,9 +6,30 @@
 from itertools import count
 
 import pytest
+from robolink_cli.console.exit_codes import exit_code
 
 from robolink.controllers import SimpleController, SimpleMachine
-from robolink.errors import BusyError, ConfigError, LeaseLostError, OutcomeUnknownError
+from robolink.errors import (
+    BusyError,
+    CalibrationError,
+    ConfigError,
+    ConnectError,
+    ControllerError,
+    DeclinedError,
+    JournalError,
+    LeaseHeldError,
+    LeaseLostError,
+    NotReadyError,
+    NotReadyReason,
+    OutcomeUnknownError,
+    RemoteProtocolError,
+    StoppedError,
+    ToolChangedError,
+    ToolError,
+    ToolIndexError,
+    TransportBrokenError,
+    VerifyError,
+)
 from robolink.journal import memory_journal
 from robolink.model import ANY, EntryKind, Marker, MarkerKind, plain_offset
 from robolink.transaction import Settler, ToolChange, Wanted, carrying_out, change_tools
@@ -49,21 +70,126 @@ def test_f79_of_two_at_once_one_is_let_in_and_the_other_then_sees_its_result():
         assert entry.details["order"] == ORDER
 
 
+ENDS = {
+    "declined": (DeclinedError("No."), DeclinedError),
+    "stopped": (StoppedError("Somebody stopped it."), StoppedError),
+    "interrupted": (KeyboardInterrupt(), StoppedError),
+    "measured badly": (CalibrationError("rank_deficient", "Too alike."), CalibrationError),
+    "put back": (VerifyError("Off.", code="large_drift"), VerifyError),
+    "changed": (ToolChangedError("Changed."), ToolError),
+    "no such tool": (ToolIndexError("There is no tool 16."), ToolIndexError),
+    "guard": (NotReadyError("Open.", reason=NotReadyReason.GUARD_OPEN), ControllerError),
+    "misspelt": (ConfigError("No such file."), ConfigError),
+    "a defect": (RuntimeError("an index is out of range"), ConfigError),
+}
+
+
 @pytest.mark.fault("F79")
-def test_f79_an_order_whose_change_was_not_kept_may_be_run_again():
+@pytest.mark.parametrize("end", ENDS)
+def test_f79_an_order_that_ended_without_a_kept_change_ends_in_the_same_way_again(end):
+    """Whoever said no to it is not overruled by the queue that delivers it again."""
+    raised, again = ENDS[end]
     desk = Desk()
     with desk.connected() as controller:
         before = controller.tools.read(1)
-        with carrying_out(controller, ORDER, JOB) as order:
-            change = ToolChange(
-                controller, [Wanted(1, NEW[1], ANY)], order=order, describe=lambda _made: {}
-            )
-            with pytest.raises(ConfigError, match="no"), change:
+        with pytest.raises(type(raised)), carrying_out(controller, ORDER, JOB) as order:
+            with ToolChange(controller, [Wanted(1, NEW[1], ANY)], order=order) as change:
                 change.write()
-                raise ConfigError("no")
+                raise raised
         assert controller.tools.read(1) == before
+        entries = desk.journal.count()
+        for _ in range(2):
+            with pytest.raises(again, match=f"{ORDER} ended on .* without") as told:
+                with carrying_out(controller, ORDER, JOB):
+                    pytest.fail("it was run again")
+            if end not in ("a defect", "interrupted"):  # 70 and 130 say how this process ended
+                assert exit_code(told.value) == exit_code(raised)
+        assert "Give a new order" in str(told.value)
+        assert getattr(told.value, "code", "") == getattr(raised, "code", "")
+        with pytest.raises(ConfigError, match="for another job"):
+            with carrying_out(controller, ORDER, {"another": "job"}):
+                pytest.fail("it was run")
+        assert desk.journal.count() == entries
+        with carrying_out(controller, "A-18", JOB) as order:
+            assert order.done is None
+        for _ in range(2):  # whatever it left open is another matter
+            with pytest.raises(RemoteProtocolError), carrying_out(controller, "A-19", JOB):
+                raise RemoteProtocolError("What?")
+
+
+NOT_NOW = {
+    "not reached": ConnectError("Nobody answers."),
+    "cut": TransportBrokenError("The cable is out."),
+    "busy": BusyError("Another operation is running."),
+    "locked": LeaseHeldError("Ann has locked it."),
+    "journal": JournalError("The disk is full."),
+    "unknown": OutcomeUnknownError("No answer came."),
+    "production": NotReadyError("A program runs.", reason=NotReadyReason.RUNNING),
+}
+
+
+@pytest.mark.fault("F79")
+@pytest.mark.parametrize("moment", NOT_NOW)
+def test_f79_an_order_for_which_only_the_moment_was_wrong_is_carried_out_later(moment):
+    desk = Desk()
+    with desk.connected() as controller:
+        with pytest.raises(type(NOT_NOW[moment])), carrying_out(controller, ORDER, JOB):
+            raise NOT_NOW[moment]
         with carrying_out(controller, ORDER, JOB) as order:
             assert order.done is None
+            change_tools(controller, [Wanted(1, NEW[1], ANY)], order=order)
+            kept = desk.journal.count()
+        with pytest.raises(DeclinedError), carrying_out(controller, ORDER, JOB) as order:
+            assert order.done is not None
+            raise DeclinedError("after it was kept, so this ends nothing")
+        assert desk.journal.count() == kept
+
+
+@pytest.mark.fault("F79")
+def test_f79_an_order_that_selects_counts_as_long_as_that_tool_is_selected():
+    """Killed between its last write and the selection, it is found complete, and is not done."""
+    desk = Desk()
+    with desk.connected() as controller:
+        change_tools(controller, [Wanted(2, NEW[2], ANY)])
+        with carrying_out(controller, ORDER, JOB) as order:
+            change_tools(controller, [Wanted(1, NEW[1], ANY)], order=order, select=2)
+        assert controller.tools.selected() == 2
+        with carrying_out(controller, ORDER, JOB) as order:
+            assert order.done is not None
+        controller.tools.select(1)
+        with (
+            pytest.raises(ToolChangedError, match="left tool 2 selected; tool 1 is"),
+            carrying_out(controller, ORDER, JOB),
+        ):
+            pytest.fail("it was told as done")
+        with carrying_out(controller, "A-18", JOB) as order:
+            change = ToolChange(controller, [Wanted(1, NEW[2], ANY)], order=order, select=2)
+            with pytest.raises(LeaseLostError), change:
+                change.write()
+                controller.tools.select(1)  # as if the process had died before it selected 2
+                raise LeaseLostError("as if it had been killed here")
+        (marker,) = controller.outcomes.open_markers()
+        settler = Settler(controller)
+        settler.settle(settler.examine(marker))
+        with pytest.raises(ToolChangedError, match="2 selected"):
+            with carrying_out(controller, "A-18", JOB):
+                pytest.fail("it was told as done")
+
+
+@pytest.mark.fault("F79")
+def test_f79_what_cannot_be_written_after_all_leaves_the_tool_selected_that_was():
+    desk = Desk()
+    with desk.connected() as controller:
+        change_tools(controller, [Wanted(1, NEW[1], ANY), Wanted(2, NEW[2], ANY)], select=1)
+        change = ToolChange(controller, [Wanted(1, NEW[2], ANY)], select=2)
+        with pytest.raises(DeclinedError), change:
+            change.write()
+            assert controller.tools.selected() == 2
+            raise DeclinedError("no")
+        assert controller.tools.selected() == 1
+        assert controller.tools.read(1) == NEW[1]
+        change_tools(controller, [], select=2)
+        assert controller.tools.selected() == 2
 
 
 @pytest.mark.fault("F79")

@@ -1,18 +1,25 @@
 """One controller for one command: connected, warnings shown, closed in order."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
 import robolink
 from robolink.controller_outcome import UNTOUCHED, ControllerOutcome, note_outcome, outcome_after
-from robolink.errors import ConfigError, ControllerError, OutcomeUnknownError, RobolinkError
+from robolink.errors import (
+    ConfigError,
+    ConnectError,
+    ControllerError,
+    LoginUnansweredError,
+    OutcomeUnknownError,
+    RobolinkError,
+)
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import joined, tr
-from robolink_cli.access.cell import acceleration_of, require_expected_robot
+from robolink_cli.access.cell import acceleration_of
 from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
@@ -32,6 +39,13 @@ from robolink_cli.session.stop_listener import (
 if TYPE_CHECKING:
     from robolink.config import Expected
     from robolink.model import ChangeLimits, Controller, Marker, Secret
+
+
+LONGEST_CHECK_S: Final = 10.0
+"""Longest time for which a check of cells has one of them, in s."""
+
+_OPENED_ONCE = ("+serial:", "+modbus-rtu:", "+can:")
+"""Schemes of lines that serve one process of a computer."""
 
 
 @contextmanager
@@ -76,6 +90,7 @@ def open_controller(
     if context.doubt is not None and not unhindered:
         raise context.doubt
     password = password_of(context)
+    _let_a_check_end(url)
     signature = replace(
         signature_of(context.operator, context.expected, changes=changes),
         nozzle=context.nozzle,
@@ -85,18 +100,21 @@ def open_controller(
     with (
         _only_what_was_touched(always=changes),
         recording(context.record, url.partition("?")[0]) as trace,
-        robolink.connect(
+        _naming_the_holder(
             url,
-            password=password,
-            timeout_s=context.timeout_s,
-            remote_timeout_s=context.remote_timeout_s,
-            acceleration_mm_s2=acceleration_of(context.cell),
-            wait_s=context.wait_s,
-            trace=trace,
-            signature=signature,
-            limits=_limits_of(context, usual_change_mm),
-            glance=unhindered,
-            tell=note,
+            lambda: robolink.connect(
+                url,
+                password=password,
+                timeout_s=context.timeout_s,
+                remote_timeout_s=context.remote_timeout_s,
+                acceleration_mm_s2=acceleration_of(context.cell),
+                wait_s=context.wait_s,
+                trace=trace,
+                signature=signature,
+                limits=_limits_of(context, usual_change_mm),
+                glance=unhindered,
+                tell=note,
+            ),
         ) as controller,
         controller.latch.ending(tr("The command")),
     ):
@@ -119,6 +137,38 @@ def open_controller(
         # A stop came while the connection was closing: do not report success.
         with controller.ledger.telling():
             controller.latch.require_open(tr("The command"))
+
+
+def _let_a_check_end(url: str) -> None:
+    """Wait for a check that has this controller for a moment: an EPSON serves one client."""
+    if "+sim://" in url:
+        return
+    from robolink.stopping import await_brief_holders
+    from robolink.transport import far_end_of
+
+    with suppress(RobolinkError):  # connecting reports what is wrong with the URL
+        await_brief_holders(far_end_of(url), within_s=LONGEST_CHECK_S)
+
+
+def _naming_the_holder(url: str, connect: "Callable[[], Controller]") -> "Controller":
+    """Connect; if the only place is taken, say which process of this computer has it.
+
+    Raises:
+        LeaseHeldError: It is taken, and such a process is known.
+        RobolinkError: As ``connect`` raises it.
+    """
+    try:
+        return connect()
+    except ConnectError as error:
+        opened_once = any(medium in url for medium in _OPENED_ONCE)
+        if not opened_once and not isinstance(error, LoginUnansweredError):
+            raise
+        from robolink_cli.session.take_over import name_holder  # it is nearly always free
+
+        named = name_holder(url, error)
+        if named is error:
+            raise
+        raise named from error
 
 
 def _limits_of(context: CliContext, usual_change_mm: float | None) -> "ChangeLimits | None":
@@ -219,8 +269,8 @@ def password_of(context: CliContext) -> "Secret | None":
     Raises:
         ConfigError: The password file is wrong.
     """
+    from robolink.config.passwords import find_password
     from robolink.transport import parse_url
-    from robolink_cli.access.password import find_password
 
     settings = context.cell.settings if context.cell else context.reach
     return find_password(
@@ -232,6 +282,8 @@ def password_of(context: CliContext) -> "Secret | None":
 
 
 def _check_robot(controller: "Controller", cell: "Expected", *, looks: bool) -> None:
+    from robolink.config import require_expected_robot
+
     try:
         require_expected_robot(controller, cell)
     except ConfigError as error:

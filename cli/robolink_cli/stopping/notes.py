@@ -71,9 +71,10 @@ def last_known(url: str) -> str:
     from robolink.transport import parse_url
 
     try:
-        if not may_exist(default_location()):
+        address = parse_url(url).address
+        if not may_exist(default_location(address)):
             return ""
-        name = open_journal(read_only=True).log(parse_url(url).address).identity
+        name = open_journal(address=address, read_only=True).log(address).identity
     except RobolinkError:
         return ""
     return name if is_own_name(name) else ""

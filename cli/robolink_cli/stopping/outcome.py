@@ -24,6 +24,7 @@ class Telling:
         self._request = request
         self._outcome = outcome
         self._named = request.named or outcome.only
+        _use_journal_of(self._named)
 
     def payload(self) -> dict[str, object]:
         """Return the document of a stop that ended well."""
@@ -86,12 +87,15 @@ class Telling:
         from robolink import __version__
         from robolink.journal import default_location, may_exist, open_journal, signature_here
 
-        if not may_exist(default_location()):
-            return
         address = parse_url(self._outcome.url).address
-        log = open_journal(read_only=True).log(address, signature=signature_here(__version__))
+        if not may_exist(default_location(address)):
+            return
+        log = open_journal(address=address, read_only=True).log(
+            address, signature=signature_here(__version__)
+        )
         try:
             log.look()
+            log.refuse_holder(silent=True)
         except LeaseHeldError as held:
             error.what = listed(error.what, [held.what])
             error.remedy = tr(
@@ -154,10 +158,10 @@ class Telling:
         from robolink.journal import default_location, may_exist, open_journal
 
         try:
-            if not may_exist(default_location()):
-                return []
-            journal = open_journal(read_only=True)
             address = parse_url(self._outcome.url).address if self._outcome.keys else ""
+            if not may_exist(default_location(address)):
+                return []
+            journal = open_journal(address=address, read_only=True)
             log = journal.log(address)
             open_now = log.open_markers()
         except JournalError as error:
@@ -167,6 +171,19 @@ class Telling:
         if open_now and note_at_work(log, self._named):
             return []
         return [marker_notice(marker, self._named) for marker in open_now]
+
+
+def _use_journal_of(named: str) -> None:
+    """Look for the journal where the cell files say, as far as they can be read."""
+    from robolink.config import reach_cell
+    from robolink.journal import name_journals
+    from robolink_cli.access.cell import is_cell_name
+
+    if named and is_cell_name(named):
+        with suppress(RobolinkError):
+            reach = reach_cell(named)
+            places = {parse_url(reach.url).address: reach.journal, "": reach.journal}
+            name_journals(places, afresh=True)
 
 
 def _shown(url: str) -> str:

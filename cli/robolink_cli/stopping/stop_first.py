@@ -218,7 +218,7 @@ def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
     if not outcome.url.startswith("epson+"):
         yield ""
         return
-    from robolink_cli.access.password import from_keyring, from_places
+    from robolink.config.passwords import from_keyring, from_places
 
     try:
         near = from_places(file or None, variable or None)

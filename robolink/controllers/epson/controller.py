@@ -1,6 +1,6 @@
 """An EPSON controller on Remote Ethernet, and logging in to one."""
 
-from contextlib import suppress
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
 from robolink.controllers.controller_core import ControllerCore
@@ -12,6 +12,7 @@ from robolink.controllers.epson.link import EpsonLink, FactReader
 from robolink.controllers.epson.preserve import EpsonPreserver, EpsonResolver, PendingValues
 from robolink.controllers.epson.session import (
     EpsonSession,
+    alone,
     as_sent,
     command_class_of,
     execution,
@@ -25,8 +26,6 @@ from robolink.controllers.registry import ConnectionTerms
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
-    JournalError,
-    LoginUnansweredError,
     NotReadyError,
     NotReadyReason,
     ReadBackError,
@@ -366,23 +365,21 @@ def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         LeaseHeldError: Nobody answers the login, and somebody else has the controller.
         RobolinkError: As :func:`open_epson`, and as the transport.
     """
+    return alone(url, terms, lambda told: _opened(url, terms, told))
+
+
+def _opened(url: LinkUrl, terms: ConnectionTerms, told: Callable[[OutcomeLog], None]) -> Controller:
     line = open_line(url, timeout_s=terms.timeout_s, clock=terms.clock)
     outcomes = terms.record_of(line.transport)
-    try:
-        return open_epson(
-            line,
-            outcomes=outcomes,
-            password=terms.password,
-            timeout_s=terms.timeout_s,
-            remote_timeout_s=terms.remote_timeout_s,
-            acceleration_mm_s2=terms.acceleration_mm_s2,
-        )
-    except LoginUnansweredError:
-        # The controller serves one client at a time (docs/reference/epson.md 1.1). The lease may
-        # name that client, if the journal can be read.
-        with suppress(JournalError):
-            outcomes.look()
-        raise
+    told(outcomes)
+    return open_epson(
+        line,
+        outcomes=outcomes,
+        password=terms.password,
+        timeout_s=terms.timeout_s,
+        remote_timeout_s=terms.remote_timeout_s,
+        acceleration_mm_s2=terms.acceleration_mm_s2,
+    )
 
 
 def open_epson(

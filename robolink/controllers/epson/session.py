@@ -12,20 +12,25 @@ answer that nobody asked for, too.
 
 What a request does is judged from the text that leaves, not from who sends it: one that nobody
 thought of counts as acting, and is held back while a stop is active.
+
+Who else has the only login is asked of the record: the controller does not tell.
 """
 
 import re
-from collections.abc import Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
-from robolink.controllers.epson.line import EpsonConversation, EpsonLine, as_shown
+from robolink.controllers.epson.line import SERIAL, EpsonConversation, EpsonLine, as_shown
 from robolink.errors import (
     BusyError,
     Concerning,
+    ConnectError,
+    JournalError,
+    LoginUnansweredError,
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
@@ -33,7 +38,7 @@ from robolink.errors import (
 )
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
-from robolink.model import Secret
+from robolink.model import Controller, OutcomeLog, Secret
 from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import (
     EndOfStream,
@@ -46,6 +51,10 @@ from robolink.protocols.epson_text import (
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass, StopLatch
 from robolink.timing import AnswerTimes, Deadline
+from robolink.transport import LinkUrl
+
+if TYPE_CHECKING:  # a stop does without the journal, which comes with it
+    from robolink.controllers.registry import ConnectionTerms
 
 _CALM: Final = frozenset({"stop", "abort", "pause", "resetalm", "setmotorsoff"})
 _SESSION: Final = frozenset({"login", "logout"})
@@ -365,4 +374,82 @@ def _prove_in_step(session: EpsonSession) -> None:
         return  # a refusal is an answer too
     except (RemoteProtocolError, TransportTimeoutError) as error:
         error.remedy = tr("Connect again; if it happens twice, try numbers=ascii_hex in the URL.")
+        raise
+
+
+Opened = Callable[[Callable[[OutcomeLog], None]], Controller]
+"""Logs in once and returns the controller; tells its record before."""
+
+
+def alone(url: LinkUrl, terms: "ConnectionTerms", opened: Opened) -> Controller:
+    """Log in to a controller that nobody else has.
+
+    A second client is not answered, and is told nothing about the first one
+    (docs/reference/epson.md 1.1). The record is: it names a process of this computer that is at
+    work, before a connection is tried, and whoever has the lease, after a login that was not
+    answered. That is tried a second time where somebody has recorded something meanwhile, and is
+    gone.
+
+    Args:
+        url: The controller.
+        terms: The terms of the connection.
+        opened: Logs in.
+
+    Raises:
+        LeaseHeldError: Somebody has it; where a process of this computer responds, nothing was
+            connected.
+        LoginUnansweredError: Nobody answers, and nobody is known to have it.
+        RobolinkError: As ``opened`` raises it.
+    """
+    before = None if terms.glance or url.medium == "sim" else _before(url, terms)
+    try:
+        return _named(url, terms, opened)
+    except LoginUnansweredError:
+        if before is None or before.newest == _newest(before.record):
+            raise
+    return _named(url, terms, opened)
+
+
+@dataclass(frozen=True, slots=True)
+class _Before:
+    """What was on record before a login was tried.
+
+    Attributes:
+        record: Of the controller.
+        newest: Number of its newest entry, 0 for none.
+    """
+
+    record: OutcomeLog
+    newest: int
+
+
+def _before(url: LinkUrl, terms: "ConnectionTerms") -> _Before | None:
+    """Refuse while a process of this computer is at work; return what is on record.
+
+    Raises:
+        LeaseHeldError: One is.
+    """
+    with suppress(JournalError):  # whatever needs the journal says what is wrong with it
+        record = terms.record_at(url.address)
+        record.refuse_holder(silent=False)
+        return _Before(record, _newest(record))
+    return None
+
+
+def _newest(record: OutcomeLog) -> int:
+    return next((entry.number for entry in record.recorded()), 0)
+
+
+def _named(url: LinkUrl, terms: "ConnectionTerms", opened: Opened) -> Controller:
+    """Log in; if the only place is taken, say who has it, as far as that is on record."""
+    told: list[OutcomeLog] = []
+    try:
+        return opened(told.append)
+    except ConnectError:
+        if not told and url.medium == SERIAL:  # its port is opened once
+            told.append(terms.record_at(url.address))
+        for record in told:
+            with suppress(JournalError):
+                record.look()
+                record.refuse_holder(silent=True)
         raise

@@ -1,6 +1,8 @@
 """backup, restore, compare: the tools of a controller and a file."""
 
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated
 
@@ -10,13 +12,14 @@ from robolink.backup import (
     Backup,
     Comparison,
     ComparisonTolerance,
+    RestoreChange,
     RestorePlan,
     ToolComparison,
     keep_first_backup,
 )
-from robolink.backup import restore as restore_tools
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, json_fields, json_value, require_engineer
+from robolink.transaction import Order, Wanted, change_tools, finish_order
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit, json_is_on, note, say, show_requests, table
@@ -26,6 +29,13 @@ from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accept
 from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.order import (
+    OrderId,
+    ordered,
+    require_no_dry_run,
+    show_done,
+    with_order,
+)
 from robolink_cli.views.documents import number, receipt_payload, show_change
 
 
@@ -153,16 +163,27 @@ def backup(
     *,
     file: Annotated[Path, _FILE, CliArgument()],
     force: Overwrite = False,
+    order: OrderId = None,
 ) -> None:
     """Save all fifteen tools, the selected tool and the controller's identity. Reads only."""
-    from robolink.backup import save, take_backup
+    from robolink.backup import backup_to_text, save, take_backup
     from robolink.files.named import require_free
 
-    require_free(file, replace=force)
-    with open_controller(context) as controller:
+    if order is None:
+        require_free(file, replace=force)
+    with open_controller(context) as controller, ordered(controller, order, "tool backup") as found:
+        if found is not None and found.done is not None:
+            done = found
+            emit("backup-saved", with_order(found.done.result, found), lambda: show_done(done))
+            return
+        require_free(file, replace=force)
         taken = take_backup(controller)
-    save(taken, file, replace=force)
-    emit("backup-saved", backup_payload(taken, file), lambda: show_backup(taken, file))
+        payload = backup_payload(taken, file)
+        if found is not None:
+            data = backup_to_text(taken).encode("ascii")
+            finish_order(controller, found, payload, files={file: data})
+        save(taken, file, replace=force)
+    emit("backup-saved", with_order(payload, found), lambda: show_backup(taken, file))
 
 
 @click.command()
@@ -231,22 +252,39 @@ def restore(
     ] = False,
     accepted_mm: AcceptedLength = None,
     accepted_deg: AcceptedAngle = None,
+    order: OrderId = None,
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Write the tools of a backup that differ, each only if nobody changed it meanwhile.
+    """Write the tools of a backup that differ: all or none, each only if nobody changed it.
 
     A tool that is undefined in the backup is cleared. Nothing else changes. Before a change beyond
     the cell's max_change_mm or max_change_deg it asks, even with --yes.
     """
-    from robolink.backup import load, plan_restore, read_tools, require_same_controller
+    from robolink.backup import (
+        backup_to_text,
+        load,
+        plan_restore,
+        read_tools,
+        require_same_controller,
+    )
 
+    require_no_dry_run(order, dry_run=dry_run)
     wanted = load(file)
-    with open_controller(context, changes=not dry_run) as controller:
+    # The same name with other values in it is another job.
+    backed_up = sha256(backup_to_text(wanted).encode("ascii")).hexdigest()
+    with (
+        open_controller(context, changes=not dry_run) as controller,
+        ordered(controller, order, "tool restore", backup=backed_up) as found,
+    ):
+        if found is not None and found.done is not None:
+            done = found
+            emit("restore", with_order(found.done.result, found), lambda: show_done(done))
+            return
         if not other_controller:
             require_same_controller(wanted, controller.identity, controller.facts())
         plan = plan_restore(wanted, read_tools(controller), tools=tools, selected=selected)
-        restoration = Restoration(controller, plan)
+        restoration = Restoration(controller, plan, file, order=found)
         requests = restoration.requests()
         if dry_run:
             show_requests(requests)
@@ -260,15 +298,26 @@ def restore(
                 asks=not json_is_on(),
             )
         payload = restoration.run(accepted_mm=accepted_mm, accepted_deg=accepted_deg)
-    emit("restore", {"file": str(file), **payload}, restoration.show_end)
+    emit("restore", with_order(payload, found), restoration.show_end)
 
 
 class Restoration:
-    """One restore of one controller."""
+    """One restore of one controller, as one change.
 
-    def __init__(self, controller: Controller, plan: RestorePlan) -> None:
+    Args:
+        controller: The controller, connected.
+        plan: What to do.
+        file: Where the backup is.
+        order: The order that it carries out.
+    """
+
+    def __init__(
+        self, controller: Controller, plan: RestorePlan, file: Path, *, order: Order | None = None
+    ) -> None:
         self._controller = controller
         self._plan = plan
+        self._file = file
+        self._order = order
 
     def requests(self) -> list[str]:
         """Return what would be sent besides reads; finds what the controller cannot store.
@@ -304,8 +353,19 @@ class Restoration:
             accepted_mm: The length of a jump that was accepted in advance.
             accepted_deg: The angle of a jump that was accepted in advance.
         """
+        selected = self._controller.tools.selected()
+        if self._plan.select is not None:
+            selected = self._plan.select
+
+        def document(receipts: Sequence[ToolReceipt]) -> dict[str, object]:
+            restored = [receipt_payload(receipt) for receipt in receipts]
+            return {"file": str(self._file), "restored": restored, "selected_tool": selected}
+
         receipts: tuple[ToolReceipt, ...] = ()
-        if not self._plan.empty:
+        if self._plan.empty:
+            if self._order is not None:
+                finish_order(self._controller, self._order, document(()))
+        else:
             require_engineer(self._controller.outcomes, tr("restore tools from a backup"))
             with ExitStack() as accepted:
                 for change in self._plan.changes:
@@ -321,11 +381,23 @@ class Restoration:
                             )
                         )
                 keep_first_backup(self._controller, tell=note)
-                receipts = restore_tools(self._controller.tools, self._plan, tell=note)
-        return {
-            "restored": [receipt_payload(receipt) for receipt in receipts],
-            "selected_tool": self._controller.tools.selected(),
-        }
+                receipts = change_tools(
+                    self._controller,
+                    [
+                        Wanted(change.tool, change.wanted, change.now, then_select=then)
+                        for change, then in self._in_order()
+                    ],
+                    tell=note,
+                    order=self._order,
+                    describe=document,
+                    select=self._plan.select,
+                )
+        return document(receipts)
+
+    def _in_order(self) -> Iterator[tuple[RestoreChange, int | None]]:
+        """Yield each change, and the tool that is selected before it should it clear that."""
+        for change in self._plan.changes:
+            yield change, self._plan.select if change.wanted is None else None
 
     def show_end(self) -> None:
         """Show how it ended."""

@@ -297,6 +297,7 @@ def clear(
     *,
     number: _Number,
     then_select: ThenSelect = None,
+    order: OrderId = None,
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
@@ -304,31 +305,68 @@ def clear(
 
     The selected tool is cleared only with --then-select: the machine then uses that tool.
     """
-    from robolink.backup import keep_first_backup
-    from robolink.transaction import Wanted, change_tools
-    from robolink_cli.views.documents import receipt_payload
-
-    with open_controller(context, changes=not dry_run) as controller:
-        before = controller.tools.read(number)
-        if dry_run:
+    require_no_dry_run(order, dry_run=dry_run)
+    with (
+        open_controller(context, changes=not dry_run) as controller,
+        ordered(controller, order, "tool clear") as found,
+    ):
+        if found is not None and found.done is not None:
+            payload = found.done.result
+        elif dry_run:
             requests = controller.tools.preview_clear(number, then_select=then_select)
             show_requests(requests)
             return
-        # Refuse before asking a question.
-        controller.tools.preview_clear(number, then_select=then_select)
-        agree(_clear_question(number, then_select), yes=yes, asks=not json_is_on())
-        keep_first_backup(controller, tell=note)
-        wanted = Wanted(number, None, before, then_select=then_select)
-        (receipt,) = change_tools(controller, [wanted], tell=note)
-        selected = controller.tools.selected()
-    done = tr("was undefined already") if receipt.skipped else tr("cleared, read back")
+        else:
+            payload = _clear(controller, number, then_select, order=found, yes=yes)
+    skipped, selected = payload["skipped"], payload["selected_tool"]
+    done = tr("was undefined already") if skipped else tr("cleared, read back")
 
     def show() -> None:
+        if found is not None and found.done is not None:
+            show_done(found)
+            return
         say(tr("tool {number}: {done}", number=number, done=done))
         if selected is not None:
             say(tr("Tool {tool} is selected.", tool=selected))
 
-    emit("tool-clear", receipt_payload(receipt) | {"selected_tool": selected}, show)
+    emit("tool-clear", with_order(payload, found), show)
+
+
+def _clear(
+    controller: "Controller",
+    number: int,
+    then_select: int | None,
+    *,
+    order: "Order | None",
+    yes: bool,
+) -> Mapping[str, object]:
+    """Ask, clear, and return the document."""
+    from robolink.backup import keep_first_backup
+    from robolink.transaction import Wanted, change_tools
+    from robolink_cli.views.documents import receipt_payload
+
+    before = controller.tools.read(number)
+    # Refuse before asking a question.
+    controller.tools.preview_clear(number, then_select=then_select)
+    selected = controller.tools.selected()
+    agree(_clear_question(number, then_select), yes=yes, asks=not json_is_on())
+    keep_first_backup(controller, tell=note)
+    gives_way = then_select is not None and selected == number
+    left = then_select if gives_way else selected
+
+    def document(receipts: "Sequence[ToolReceipt]") -> dict[str, object]:
+        (receipt,) = receipts
+        return receipt_payload(receipt) | {"selected_tool": left}
+
+    receipts = change_tools(
+        controller,
+        [Wanted(number, None, before, then_select=then_select)],
+        tell=note,
+        order=order,
+        describe=document,
+        select=then_select if gives_way else None,
+    )
+    return document(receipts)
 
 
 def _clear_question(number: int, then_select: int | None) -> str:

@@ -23,6 +23,7 @@ from robolink_cli.session.context import (
     guided_if_alone,
     optional_controller,
 )
+from robolink_cli.session.take_over import end_holder
 from robolink_cli.views.documents import finding_payload
 from robolink_cli.wizard.state import ChoiceSubject, choose
 
@@ -153,8 +154,9 @@ def recover(
             late=True,
             metavar="REASON",
             help="Take over this controller from the program that has it locked; also a "
-            "PLC's mailbox, where the PLC stops any movement. That program is refused "
-            "from then on. Your name and the reason are recorded.",
+            "PLC's mailbox, where the PLC stops any movement. A program of this computer is "
+            "ended: first the robot is stopped and must stand still. One of another computer "
+            "is refused from then on. Your name and the reason are recorded.",
         ),
     ] = None,
 ) -> int:
@@ -174,9 +176,12 @@ def recover(
 
     def settle() -> tuple[int, dict[str, object]]:
         at = context_at_desk(context, declared("Recover"))
+        ended = end_holder(at, take_over) if take_over is not None and not dry_run else None
         with open_controller(at, quiet=True, changes=not dry_run) as controller:
             if take_over is not None and not dry_run:
                 controller.take_over(take_over)
+                if ended is not None:
+                    controller.outcomes.append(ended.entry())
             word = choose or (None if forget else chosen_at_desk(controller))
             guide = Guide(
                 controller,

@@ -1,5 +1,6 @@
 """undo: writes back what tools held before a change."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import click
@@ -7,8 +8,8 @@ import click
 from robolink.backup import keep_first_backup
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink.model import Controller
-from robolink.transaction import Undone, UndoPlan
+from robolink.model import Controller, ToolReceipt
+from robolink.transaction import Order, Undone, UndoPlan
 from robolink.transaction import undo as take_back
 from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, json_is_on, note, say, show_requests
@@ -18,6 +19,13 @@ from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.order import (
+    OrderId,
+    ordered,
+    require_no_dry_run,
+    show_done,
+    with_order,
+)
 from robolink_cli.views.documents import receipt_payload, show_change
 
 
@@ -36,6 +44,7 @@ def undo(
         CliOption(metavar="NUMBER", help="Write back the value that this journal entry confirms."),
     ] = None,
     then_select: ThenSelect = None,
+    order: OrderId = None,
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
@@ -45,19 +54,28 @@ def undo(
     shows them. Needs an engineer, is refused when somebody else wrote the tool since, and can
     itself be undone. Moves nothing.
     """
-    from robolink.transaction import plan_undo
-    from robolink_cli.commands.record.journal_lookup import change_named
-
+    require_no_dry_run(order, dry_run=dry_run)
     if change is not None and to is not None:
         raise ConfigError(
             tr("Give CHANGE or --to, not both."),
             remedy=tr("Name a change to undo, or an entry whose value to write back."),
         )
     job = "" if dry_run else tr("undo a change of a tool")
-    with open_controller(context, changes=not dry_run, job=job) as controller:
-        chosen = change_named(controller.outcomes.recorded(), change) if change else ""
-        plan = plan_undo(controller, tool=tool, change=chosen, to=to)
-        undoing = Undoing(controller, plan, then_select=then_select)
+    with (
+        open_controller(context, changes=not dry_run, job=job) as controller,
+        # Looked up before the plan: the newest change is another one once this is carried out.
+        ordered(controller, order, "undo") as found,
+    ):
+        if found is not None and found.done is not None:
+            done = found
+            emit("undo", with_order(found.done.result, found), lambda: show_done(done))
+            return
+        undoing = Undoing(
+            controller,
+            _planned(controller, change, tool=tool, to=to),
+            then_select=then_select,
+            order=found,
+        )
         requests = undoing.requests()
         if not json_is_on():
             undoing.show()
@@ -68,7 +86,17 @@ def undo(
             _agree(yes=yes)
         payload = undoing.run()
     called = context.cell.name if context.cell else str(context.url)
-    emit("undo", payload, lambda: undoing.show_end(called))
+    emit("undo", with_order(payload, found), lambda: undoing.show_end(called))
+
+
+def _planned(
+    controller: Controller, change: str | None, *, tool: int | None, to: int | None
+) -> UndoPlan:
+    from robolink.transaction import plan_undo
+    from robolink_cli.commands.record.journal_lookup import change_named
+
+    chosen = change_named(controller.outcomes.recorded(), change) if change else ""
+    return plan_undo(controller, tool=tool, change=chosen, to=to)
 
 
 def _agree(*, yes: bool) -> None:
@@ -92,14 +120,21 @@ class Undoing:
         controller: The controller, connected.
         plan: What to do.
         then_select: The tool to select in place of one that becomes undefined.
+        order: The order that it carries out.
     """
 
     def __init__(
-        self, controller: Controller, plan: UndoPlan, *, then_select: int | None = None
+        self,
+        controller: Controller,
+        plan: UndoPlan,
+        *,
+        then_select: int | None = None,
+        order: Order | None = None,
     ) -> None:
         self._controller = controller
         self._plan = plan
         self._then_select = then_select
+        self._order = order
         self._done = Undone("", ())
 
     def requests(self) -> list[str]:
@@ -131,16 +166,24 @@ class Undoing:
         """Carry it out and return the document; nothing is sent when nothing differs."""
         if self._plan.steps:
             keep_first_backup(self._controller, tell=note)
-            self._done = take_back(
-                self._controller, self._plan, then_select=self._then_select, tell=note
-            )
+        self._done = take_back(
+            self._controller,
+            self._plan,
+            then_select=self._then_select,
+            tell=note,
+            order=self._order,
+            describe=lambda receipts: self._document(self._controller.outcomes.change, receipts),
+        )
+        return self._document(self._done.change, self._done.receipts)
+
+    def _document(self, change: str, receipts: Sequence[ToolReceipt]) -> dict[str, object]:
         return {
             "sentence": self._plan.sentence,
             "remarks": list(self._plan.remarks),
             **self._plan.details,
-            "change": self._done.change or None,
+            "change": change or None,
             "unchanged": list(self._plan.unchanged),
-            "restored": [receipt_payload(receipt) for receipt in self._done.receipts],
+            "restored": [receipt_payload(receipt) for receipt in receipts],
         }
 
     def show_end(self, cell: str) -> None:

@@ -8,19 +8,20 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from robolink.config._files import CELL_FILE, config_files, read_document
+from robolink.config._files import CELL_FILE, config_files, read_document, whole_place
 from robolink.config._reach import Expected
+from robolink.config._selection import GROUP_MARK, names_meant, unknown_cell
 from robolink.errors import ConfigError
 from robolink.files.durable import write_whole
 from robolink.files.key_problems import is_not_known, sentence
 from robolink.files.toml import Problem
-from robolink.messages import known_names, tr
+from robolink.messages import tr
 from robolink.model import ChangeLimits
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-    from robolink.config._settings import CellSettings
+    from robolink.config._settings import CellFile, CellSettings
 
 _BARE_KEY = re.compile("[A-Za-z0-9_-]+")
 _KIND = 4
@@ -86,14 +87,15 @@ def _unknown(key: str, known: Sequence[str]) -> str:
     return is_not_known(key, known)
 
 
-_Said = dict[str, tuple[Path, object]]
-"""Values that files give for a cell, each with the file that gives it."""
-
 _CELL_NAME = re.compile(r"[^\s+:/\\]+")
 
 
 USUAL_CHANGE_MM: Final = 2.0
 """Default limit of a cell, in mm: more than a nozzle change explains."""
+
+
+USUAL_CHECKS_DAYS: Final = 90
+"""For how many days checks are kept where no cell file says it."""
 
 
 class CellGlimpse(NamedTuple):
@@ -153,16 +155,37 @@ def find_cell(name: str) -> Cell:
         ConfigError: There is none, or a file is wrong.
     """
     cells = load_cells()
-    if name in cells:
-        return cells[name]
-    if cells:
-        remedy = known_names(cells, name)
-    else:
-        remedy = tr(
-            "No cell file was found; 'robolink cell files' shows where robolink looks for "
-            "one. A URL such as epson+tcp://192.168.0.1:5000 needs none."
-        )
-    raise ConfigError(tr("There is no cell {name!r}.", name=name), remedy=remedy)
+    if name not in cells:
+        raise unknown_cell(name, cells)
+    return cells[name]
+
+
+@dataclass(frozen=True, slots=True)
+class CellFiles:
+    """What all cell files say together.
+
+    Attributes:
+        cells: Every cell by name, those of the file with precedence first.
+        groups: The names and patterns of each group of cells.
+        keep_checks_days: For how many days checks are kept.
+        journal: Where the journal is of cells that name none of their own; empty where no file
+            says it.
+    """
+
+    cells: Mapping[str, Cell] = field(hash=False)
+    groups: Mapping[str, tuple[str, ...]] = field(hash=False)
+    keep_checks_days: int = USUAL_CHECKS_DAYS
+    journal: str = ""
+
+    def select(self, words: Iterable[str] = ()) -> tuple[Cell, ...]:
+        """Return the cells that words name; see :func:`select_cells`.
+
+        Raises:
+            ConfigError: A word names no cell.
+        """
+        chosen = tuple(words)
+        names = names_meant(chosen, tuple(self.cells), self.groups) if chosen else self.cells
+        return tuple(self.cells[name] for name in names)
 
 
 def load_cells() -> dict[str, Cell]:
@@ -175,16 +198,55 @@ def load_cells() -> dict[str, Cell]:
     Raises:
         ConfigError: A file is wrong, or a cell has no URL in any of them.
     """
-    said: dict[str, _Said] = {}
+    return dict(load_cell_files().cells)
+
+
+def load_cell_files() -> CellFiles:
+    """Return what all cell files say; see :func:`load_cells`. Of two groups the nearer one counts.
+
+    Raises:
+        ConfigError: A file is wrong, or a cell has no URL in any of them.
+    """
+    said: dict[str, list[tuple[Path, CellSettings]]] = {}
+    groups: dict[str, tuple[str, ...]] = {}
+    keep_days: int | None = None
+    journal: tuple[str, Path] | None = None
     for file in config_files():
         if file.present:
-            for name, values in _checked(file.path).items():
-                nearer = said.setdefault(name, {})
-                if "url" not in nearer:
-                    said[name] = _together(
-                        {key: (file.path, value) for key, value in values.items()}, nearer
-                    )
-    return {name: _cell(name, values) for name, values in said.items()}
+            content = _checked(file.path)
+            groups = dict(content.groups) | groups
+            keep_days = content.keep_checks_days if keep_days is None else keep_days
+            if journal is None and content.journal is not None:
+                journal = whole_place(content.journal, file.path), file.path
+            for name, settings in content.cells.items():
+                known = said.setdefault(name, [])
+                if not known or known[-1][1].url is None:
+                    known.append((file.path, settings))
+    cells = {name: _cell(name, parts, journal) for name, parts in said.items()}
+    days = USUAL_CHECKS_DAYS if keep_days is None else keep_days
+    return CellFiles(cells, groups, days, journal[0] if journal else "")
+
+
+def select_cells(words: Iterable[str] = ()) -> tuple[Cell, ...]:
+    """Return the cells that words name, each once, in the order of the words.
+
+    What one pattern names comes in the order of the cell files.
+
+    Args:
+        words: Names, patterns and ``@GROUP``; none for all cells.
+
+    Raises:
+        ConfigError: A word names no cell, or a cell file is wrong.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.config import add_cell, select_cells
+        >>> for name in ("line3-1", "line3-2", "glue"):
+        ...     add_cell(Path("robolink.toml"), name, {"url": f"epson+sim://{name}"})
+        >>> [cell.name for cell in select_cells(["glue", "line3-*"])]
+        ['glue', 'line3-1', 'line3-2']
+    """
+    return load_cell_files().select(words)
 
 
 def check_file(path: Path) -> tuple[Problem, ...]:
@@ -202,29 +264,41 @@ def problems_in(document: dict[str, object]) -> tuple[Problem, ...]:
     Args:
         document: All of the file.
     """
+    return _validated(document)[1]
+
+
+def _validated(document: dict[str, object]) -> "tuple[CellFile | None, tuple[Problem, ...]]":
+    """Return what a cell file says, and all errors in it; nothing where there is one."""
     from pydantic import ValidationError
 
     from robolink.config._settings import AccuracySettings, CellFile, CellSettings, station_keys
 
-    cells = document.get("cells")
-    names = [
-        Problem(
-            dotted(["cells", name]),
-            tr("cannot be the name of a cell: it must not contain blanks or + : / \\"),
-        )
-        for name in (cells if isinstance(cells, dict) else ())
-        if not _CELL_NAME.fullmatch(name)
-    ]
+    wrong: list[Problem] = []
+    for table, called in (("cells", _cell_name_problem), ("groups", _group_name_problem)):
+        names = document.get(table)
+        for name in names if isinstance(names, dict) else ():
+            if not _CELL_NAME.fullmatch(name) or (table == "groups" and name[0] == GROUP_MARK):
+                wrong.append(Problem(dotted([table, name]), called()))
     try:
-        CellFile.model_validate(document)
+        content = CellFile.model_validate(document)
     except ValidationError as error:
         known = {
-            1: ["cells"],
+            1: list(CellFile.model_fields),
             3: list(CellSettings.model_fields),
             4: list(AccuracySettings.model_fields),
         }
-        return (*names, *problems_of(error, known, station_keys()))
-    return tuple(names)
+        return None, (*wrong, *problems_of(error, known, station_keys()))
+    return (None if wrong else content), tuple(wrong)
+
+
+def _cell_name_problem() -> str:
+    return tr("cannot be the name of a cell: it must not contain blanks or + : / \\")
+
+
+def _group_name_problem() -> str:
+    return tr(
+        "cannot be the name of a group: it must not contain blanks or + : / \\ or begin with @"
+    )
 
 
 def settings_of_file(path: Path) -> "Mapping[str, CellSettings]":
@@ -233,25 +307,31 @@ def settings_of_file(path: Path) -> "Mapping[str, CellSettings]":
     Raises:
         ConfigError: It cannot be read, or is no TOML.
     """
-    from robolink.config._settings import CellFile
-
-    if check_file(path):
-        return {}
-    return CellFile.model_validate(read_document(path)).cells
+    content, _ = _validated(read_document(path))
+    return {} if content is None else content.cells
 
 
 def cell_names() -> list[str]:
     """Return the names of all cells, for TAB; files with errors are skipped."""
+    return _names_in("cells")
+
+
+def group_names() -> list[str]:
+    """Return the names of all groups of cells, for TAB; files with errors are skipped."""
+    return _names_in("groups")
+
+
+def _names_in(table: str) -> list[str]:
     names: dict[str, None] = {}
-    for cells in _unchecked():
-        names |= dict.fromkeys(cells)
+    for named in _unchecked(table):
+        names |= dict.fromkeys(named)
     return list(names)
 
 
 def glimpse_of_cell(name: str) -> CellGlimpse:
     """Return what files say about a cell, unchecked, for TAB; errors are skipped."""
     url, stations = "", dict[str, None]()
-    for cells in _unchecked():
+    for cells in _unchecked("cells"):
         said = cells.get(name)
         if isinstance(said, dict):
             named = said.get("stations")
@@ -260,66 +340,93 @@ def glimpse_of_cell(name: str) -> CellGlimpse:
     return CellGlimpse(url, tuple(stations))
 
 
-def _unchecked() -> Iterator[dict[str, object]]:
-    """Yield the cells of each readable file, the one with precedence first."""
+def _unchecked(table: str) -> Iterator[dict[str, object]]:
+    """Yield a table of each readable file, of the one with precedence first."""
     for file in config_files():
         if file.present:
             try:
-                cells = read_document(file.path).get("cells")
+                found = read_document(file.path).get(table)
             except ConfigError:
                 continue
-            if isinstance(cells, dict):
-                yield cells
+            if isinstance(found, dict):
+                yield found
 
 
-def _together(farther: _Said, nearer: _Said) -> _Said:
-    """Return two files merged: the nearer one wins, station by station, row by row."""
-    both = farther | nearer
-    for table in ("stations", "accuracy"):
-        if table in farther and table in nearer:
-            (_, old), (path, new) = farther[table], nearer[table]
-            assert isinstance(old, dict) and isinstance(new, dict)  # noqa: S101, PT018 - both were checked
-            both[table] = (path, old | new)
-    return both
+def _checked(path: Path) -> "CellFile":
+    """Return what a correct file says.
 
-
-def _checked(path: Path) -> dict[str, dict[str, object]]:
-    """Return each cell of a correct file, with absolute paths."""
-    from robolink.config._settings import CellFile
-
-    problems = check_file(path)
-    if problems:
+    Raises:
+        ConfigError: It cannot be read, or is wrong.
+    """
+    content, problems = _validated(read_document(path))
+    if content is None:
         raise CELL_FILE.refusal(path, problems)
-    tables = {}
-    for name, settings in CellFile.model_validate(read_document(path)).cells.items():
-        values = settings.model_dump(exclude_unset=True)
-        if "password_file" in values:
-            hinted = Path(values["password_file"]).expanduser()
-            values["password_file"] = str(path.parent / hinted)
-        tables[name] = values
-    return tables
+    return content
 
 
-def _cell(name: str, said: Mapping[str, tuple[Path, object]]) -> Cell:
+def _cell(
+    name: str, parts: "Sequence[tuple[Path, CellSettings]]", journal: tuple[str, Path] | None
+) -> Cell:
+    """Return a cell from what the files say of it, the nearest first.
+
+    Args:
+        name: Its name.
+        parts: What each file says of it.
+        journal: What a file says of all cells that name no journal, and that file.
+
+    Raises:
+        ConfigError: Together they are wrong, or none has a URL.
+    """
+    if len(parts) == 1:
+        path, settings = parts[0]
+        settings = _with_whole_paths(settings, path)
+        origins = dict.fromkeys(settings.model_fields_set, path)
+    else:
+        settings, origins = _together(name, parts)
+    if journal is not None and settings.journal is None:
+        settings = settings.model_copy(update={"journal": journal[0]})
+        origins = {**origins, "journal": journal[1]}
+    if settings.url is None:
+        missing = Problem(dotted(["cells", name, "url"]), tr("is missing in every file"))
+        raise CELL_FILE.refusal(parts[0][0], [missing])
+    return Cell(name, settings.url, settings, origins)
+
+
+def _with_whole_paths(settings: "CellSettings", path: Path) -> "CellSettings":
+    """Return the same with its paths as seen from everywhere."""
+    whole = {
+        key: whole_place(place, path)
+        for key in ("password_file", "journal")
+        if (place := getattr(settings, key)) is not None
+    }
+    return settings.model_copy(update=whole) if whole else settings
+
+
+def _together(
+    name: str, parts: "Sequence[tuple[Path, CellSettings]]"
+) -> "tuple[CellSettings, dict[str, Path]]":
+    """Return several files merged: the nearer one wins, station by station, row by row."""
     from pydantic import ValidationError
 
     from robolink.config._settings import CellSettings
 
-    values = {key: value for key, (_, value) in said.items()}
-    origins = {key: path for key, (path, _) in said.items()}
+    values: dict[str, object] = {}
+    origins: dict[str, Path] = {}
+    for path, settings in reversed(parts):
+        for key, value in _with_whole_paths(settings, path).model_dump(exclude_unset=True).items():
+            before = values.get(key)
+            if key in ("stations", "accuracy") and isinstance(before, dict) and value is not None:
+                value = before | value
+            values[key], origins[key] = value, path
     try:
-        settings = CellSettings.model_validate(values)
+        return CellSettings.model_validate(values), origins
     except ValidationError as error:
         # Each file was valid on its own, so the error is in their combination.
         cell = dotted(["cells", name])
         problems = [
             Problem(f"{cell}.{problem.where}", problem.what) for problem in problems_of(error, {})
         ]
-        raise CELL_FILE.refusal(next(iter(origins.values())), problems) from error
-    if settings.url is None:
-        missing = Problem(dotted(["cells", name, "url"]), tr("is missing in every file"))
-        raise CELL_FILE.refusal(next(iter(origins.values())), [missing])
-    return Cell(name, settings.url, settings, origins)
+        raise CELL_FILE.refusal(parts[0][0], problems) from error
 
 
 def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:

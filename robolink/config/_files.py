@@ -60,6 +60,16 @@ CELL_FILE: Final = FileKind(
 )
 
 
+def whole_place(place: str, file: Path) -> str:
+    """Return a path that a file names, seen from that file, as seen from everywhere; a URL as is.
+
+    Args:
+        place: What the file names.
+        file: The file.
+    """
+    return place if "://" in place else str(file.parent / Path(place).expanduser())
+
+
 def read_document(path: Path) -> dict[str, object]:
     """Return the content of a cell file.
 

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 
-from robolink.config._files import config_files, read_document
+from robolink.config._files import config_files, read_document, whole_place
 from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder, write_whole
 from robolink.files.named import read_named
@@ -50,6 +50,7 @@ class Reach:
         password_file: File whose first line is the password; empty for none.
         password_env: Environment variable that holds the password; empty for none.
         timeout_s: Longest wait for one answer; 0 where nothing is said.
+        journal: Where its journal is; empty where nothing is said.
         proof: Of the cell files that were right as a whole when this was kept; empty for none.
         expected: What they say that a look has to heed; ``None`` where they were not right.
         doubt: What is wrong with the cell files, or with this; empty for nothing.
@@ -62,6 +63,7 @@ class Reach:
     proof: str = ""
     expected: Expected | None = None
     doubt: str = ""
+    journal: str = ""
 
 
 def reach_cell(name: str) -> Reach:
@@ -72,11 +74,13 @@ def reach_cell(name: str) -> Reach:
     """
     doubts: list[str] = []
     said: dict[str, object] = {}
+    of_all = ""
     for file in config_files():
         if not file.present:
             continue
         try:
-            table = _table(read_document(file.path), name)
+            document = read_document(file.path)
+            table = _table(document, name)
         except ConfigError as error:
             doubts.append(error.what)
             copy = _recall(name, file.path)
@@ -84,9 +88,11 @@ def reach_cell(name: str) -> Reach:
             if copy:
                 doubts.append(tr("The address is from the last connection: {url}.", url=copy.url))
         else:
-            hinted = table.get("password_file")
-            if isinstance(hinted, str):
-                table["password_file"] = str(file.path.parent / Path(hinted).expanduser())
+            for key in ("password_file", "journal"):
+                if isinstance(hinted := table.get(key), str):
+                    table[key] = whole_place(hinted, file.path)
+            if not of_all and isinstance(hinted := document.get("journal"), str):
+                of_all = whole_place(hinted, file.path)
         said = table | said
         if isinstance(table.get("url"), str):
             # Files with lower priority may refer to the robot at another address (``load_cells``).
@@ -95,6 +101,7 @@ def reach_cell(name: str) -> Reach:
                 password_file=_text(said, "password_file"),
                 password_env=_text(said, "password_env"),
                 doubt=" ".join(doubts),
+                journal=_text(said, "journal") or of_all or _journal_of_farther(file.path),
             )
     raise ConfigError(
         listed(tr("No address is known for the cell {name!r}:", name=name), doubts)
@@ -104,6 +111,16 @@ def reach_cell(name: str) -> Reach:
             "Give its URL in place of the name, for example -c epson+tcp://192.168.0.1:5000."
         ),
     )
+
+
+def _journal_of_farther(after: Path) -> str:
+    """Return what files with lower priority say of all journals; what is unreadable is ignored."""
+    places = [file.path for file in config_files() if file.present]
+    for path in places[places.index(after) + 1 :]:
+        with suppress(ConfigError):
+            if isinstance(hinted := read_document(path).get("journal"), str):
+                return whole_place(hinted, path)
+    return ""
 
 
 def glance_at_cell(name: str) -> Reach | None:
@@ -167,6 +184,7 @@ def _recall(name: str, origin: Path) -> Reach | None:
         timeout_s=timeout_s if isinstance(timeout_s, float) else 0.0,
         proof=_text(kept, "proof"),
         expected=_recalled_expected(kept.get("expected")),
+        journal=_text(kept, "journal"),
     )
 
 

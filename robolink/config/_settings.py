@@ -3,9 +3,11 @@
 from datetime import date
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from robolink.controllers import capabilities_of_kind
+from robolink.errors import ConfigError
+from robolink.journal import plant_place
 from robolink.locale.languages import language_named
 from robolink.messages import tr
 from robolink.model import ACCELERATION_RANGE_MM_S2, PersonRole
@@ -209,6 +211,21 @@ class AccuracySettings(BaseModel):
 
 Text = Annotated[str, Field(min_length=1)]
 
+
+def _is_a_journal(text: str) -> str:
+    scheme, mark, rest = text.partition("://")
+    if mark and scheme not in ("sqlite", "postgresql", "postgresql+psycopg"):
+        raise ValueError(tr("must be a path, or postgresql://user@host/database"))
+    before, at, _ = rest.partition("@")
+    if (at and ":" in before) or "password=" in rest.lower():
+        raise ValueError(
+            tr("must not contain a password; put it into ~/.pgpass, or into PGPASSWORD")
+        )
+    return text
+
+
+JournalPlace = Annotated[Text, AfterValidator(_is_a_journal)]
+
 EachJoint = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_length=6)]
 
 _LEAST_MM_S2, _HIGHEST_MM_S2 = ACCELERATION_RANGE_MM_S2
@@ -225,6 +242,7 @@ class CellSettings(BaseModel):
         tool: Number of the tool that is selected whenever nothing is being measured.
         password_file: File whose first line is the password, seen from the cell file.
         password_env: Environment variable that holds the password.
+        journal: Where the journal of this cell is: a path, seen from the cell file, or a URL.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set in the controller, which cannot be read over
             the wire (docs/reference/epson.md 1.1).
@@ -264,6 +282,7 @@ class CellSettings(BaseModel):
     tool: Annotated[int, Field(ge=0, le=15)] | None = None
     password_file: Text | None = None
     password_env: Annotated[str, Field(pattern="^ROBOLINK_PASSWORD[A-Z0-9_]*$")] | None = None
+    journal: JournalPlace | None = None
     timeout_s: Positive | None = None
     remote_timeout_s: Positive | None = None
     remote_timeout_confirmed_by: Annotated[Text | None, Field(validate_default=True)] = None
@@ -361,11 +380,25 @@ def _role(name: str, role: object) -> PersonRole:
 
 
 class CellFile(BaseModel):
-    """One whole ``robolink.toml``."""
+    """One whole ``robolink.toml``.
+
+    Attributes:
+        language: Of the sentences on screens.
+        journal: Where the journal is of cells that name none of their own.
+        keep_checks_days: For how many days checks of cells are kept on record.
+        groups: Names of cells, or patterns over them, by the name of the group.
+        cells: The cells by name.
+    """
 
     model_config = STRICT
 
     language: str = ""
+    journal: JournalPlace | None = None
+    keep_checks_days: Annotated[int, Field(ge=7, le=3650)] | None = None
+    groups: dict[str, Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]] = Field(
+        default_factory=dict
+    )
+    plant: str = ""
     cells: dict[str, CellSettings] = Field(default_factory=dict)
 
     @field_validator("language")
@@ -374,3 +407,17 @@ class CellFile(BaseModel):
         if language_named(language) is None and language:
             raise ValueError(tr("must be zh or en"))
         return language
+
+    @field_validator("plant")
+    @classmethod
+    def _is_a_database(cls, plant: str) -> str:
+        if not plant:
+            return plant
+        try:
+            place = plant_place(plant)
+        except ConfigError:
+            # The sentence must not repeat the value.
+            raise ValueError(tr("must be a URL: postgresql://user@host/database")) from None
+        if place.url != place.location:
+            raise ValueError(tr("holds a password: put that into ~/.pgpass or PGPASSWORD"))
+        return plant

@@ -10,7 +10,8 @@ from robolink_simulators.cell.tip_switches import LightBeam
 
 import robolink
 from robolink.errors import DeclinedError
-from robolink.journal import open_journal
+from robolink.journal import LeaseHolder, open_journal
+from robolink.journal._lease_view import this_process
 from robolink.model import EntryKind, Identity, Marker, MarkerKind, NewEntry
 from robolink.stations import Found, StationKind, station_entry
 from tests.cli.test_journal_statements import entries
@@ -49,7 +50,7 @@ def found(document, cell=0):
 
 
 def recorded():
-    return list(open_journal().entries(kinds=(EntryKind.CHECK,), newest_first=False))
+    return list(open_journal().checks(newest_first=False))
 
 
 def test_a_cell_in_order_ends_with_0_goes_on_record_and_is_not_touched(cells, simulator, capsys):
@@ -146,7 +147,8 @@ def test_one_cell_that_does_not_answer_leaves_the_others_looked_at(cells, simula
     assert cells(more=gone)[0] != 0
     assert main.run(["check"]) != 0
     lines = [line for line in capsys.readouterr().out.splitlines() if not line.startswith(" ")]
-    assert lines[-1].startswith("line3: no problem found")
+    assert lines[-2].startswith("line3: no problem found")
+    assert lines[-1] == ("Cells: 3. No problem: 1. Need attention: 0. Not checked: 2. Busy: 0.")
 
 
 def test_a_name_that_is_no_cell_stops_before_any_is_asked(cells, simulator, capsys):
@@ -160,6 +162,54 @@ def test_a_plc_is_checked_alike(cells):
     code, document = cells("plc", more=f'[cells.plc]\nurl = "{url}"\n')
     assert (code, found(document)) == (0, [])
     assert document["cells"][0]["controller"].startswith("softmotion")
+
+
+def test_patterns_and_groups_name_cells_and_one_that_names_none_stops_it(cells, simulator, capsys):
+    more = f'[cells.line4]\nurl = "{simulator.url}"\n[groups]\nnight = ["line4", "line3"]\n'
+    _, document = cells("line*", more=more)
+    assert [cell["cell"] for cell in document["cells"]] == ["line3", "line4"]
+    _, document = cells("@night")
+    assert [cell["cell"] for cell in document["cells"]] == ["line4", "line3"]
+    before = len(recorded())
+    for word, told in (("glue*", "glue*"), ("@nigth", "@night"), ("line9", "line9")):
+        assert main.run(["check", "line3", word]) == 2
+        assert told in capsys.readouterr().err
+    assert len(recorded()) == before
+    assert main.run(["cell", "list", "@night"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["line4", "line3"]
+    assert main.run(["cell", "list", "glue*"]) == 2
+
+
+def test_checks_on_record_are_shown_newest_first(cells, simulator, capsys):
+    assert main.run(["journal", "checks"]) == 0
+    assert "No check is on record here." in capsys.readouterr().out
+    assert cells(more='[cells.away]\nurl = "epson+tcp://127.0.0.1:1"\n')[0] == 3
+    assert main.run(["journal", "checks"]) == 0
+    newest, oldest = sorted(capsys.readouterr().out.splitlines(), key=lambda line: "line3" in line)
+    assert "away: The cell could not be checked: " in newest
+    assert oldest.endswith("line3: No problem found.")
+    assert main.run(["--json", "journal", "checks", "-c", "line3", "--limit", "5"]) == 0
+    (one,) = json.loads(capsys.readouterr().out)["checks"]
+    assert (one["cell"], one["well"]) == ("line3", True)
+    assert main.run(["--json", "journal", "list"]) == 0
+    kinds = {entry["kind"] for entry in json.loads(capsys.readouterr().out)["entries"]}
+    assert "check" not in kinds
+
+
+def test_somebody_at_work_is_named_and_ends_with_5_after_all_else(cells, simulator, capsys):
+    assert cells()[0] == 0
+    own = this_process()
+    ann = LeaseHolder(os_user="ann", host="pc-7", pid=own.pid, boot=own.boot)
+    with open_journal().log(simulator.url, holder=ann).hold("a needle change"):
+        code, document = cells()
+        assert main.run(["check"]) == 5
+        out = capsys.readouterr().out
+        away = '[cells.away]\nurl = "epson+tcp://127.0.0.1:1"\n'
+        assert cells(more=away)[0] == 3
+    (cell,) = document["cells"]
+    assert (code, cell["state"], cell["ok"]) == (5, "busy", False)
+    assert "line3: somebody is working there; not checked." in out
+    assert "a needle change" in out
 
 
 @pytest.fixture
@@ -219,7 +269,10 @@ def test_nothing_moves_without_a_person_s_yes(cells, simulator, watched, tmp_pat
     assert document["cells"][0]["tools"]["1"]["x_mm"] == 12.0
     assert (document["ok"], document["cells"][0]["ok"]) == (False, False), "nobody looked further"
     assert simulator.machine.arm.moves_started == moves
-    assert [entry.verdict for entry in recorded()] == ["No problem found."]
+    (entry,) = recorded()
+    assert entry.verdict == "The cell could not be checked: You said no."
+    assert (entry.well, entry.details["error"]) == (False, "DeclinedError")
+    assert entry.details["tools"]["1"][0] == 12.0
 
 
 def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, watched, tmp_path):

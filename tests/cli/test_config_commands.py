@@ -128,6 +128,7 @@ def test_show_says_where_each_value_came_from(cells, capsys, monkeypatch):
         "box_mm": 80,
         "notes": "needle 机",
         "timeout_s": 3,
+        "journal": str(cells / "state" / "journal.db"),
     }
     assert document["origins"] == {
         "url": site,
@@ -137,6 +138,7 @@ def test_show_says_where_each_value_came_from(cells, capsys, monkeypatch):
         "box_mm": site,
         "notes": folder,
         "timeout_s": "default",
+        "journal": "ROBOLINK_STATE_DIR",
     }
 
 

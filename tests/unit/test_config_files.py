@@ -10,8 +10,11 @@ from robolink.config import (
     check_file,
     config_files,
     find_cell,
+    group_names,
     load_cells,
+    names_meant,
     reach_cell,
+    select_cells,
 )
 from robolink.errors import ConfigError
 
@@ -275,3 +278,60 @@ def test_a_stop_waits_as_usual_where_a_cell_says_nothing_of_it(places, monkeypat
     places["named"].write_text('[cells.a]\nurl = "epson+tcp://192.0.2.1:5000"\n')
     monkeypatch.setenv("ROBOLINK_CONFIG", str(places["named"]))
     assert (reach_cell("a").url, reach_cell("a").timeout_s) == ("epson+tcp://192.0.2.1:5000", 0.0)
+
+
+# Several cells at once: names, patterns, groups.
+
+CELLS = ("line3-1", "line3-2", "glue-1", "line4-1", "@odd")
+GROUPS = {"line3": ("line3-*",), "night": ("glue-?", "line3-2", "line3-[1-9]"), "gone": ("oven-1",)}
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["glue-1", "line3-*"], ["glue-1", "line3-1", "line3-2"]),
+        (["line*-1", "line3-1"], ["line3-1", "line4-1"]),
+        (["@line3"], ["line3-1", "line3-2"]),
+        (["@night", "line4-1"], ["glue-1", "line3-2", "line3-1", "line4-1"]),
+        (["@odd"], ["@odd"]),
+        (["*"], list(CELLS)),
+    ],
+)
+def test_names_patterns_and_groups_name_each_cell_once_in_order(words, meant):
+    assert list(names_meant(words, CELLS, GROUPS)) == meant
+
+
+@pytest.mark.parametrize(
+    ("words", "what", "remedy"),
+    [
+        (["line3-1", "line5"], "There is no cell 'line5'.", "line3-1"),
+        (["oven-*"], "No cell has a name like 'oven-*'.", "glue-1"),
+        (["@lime3"], "There is no group 'lime3' in the cell files.", "@line3"),
+        (["@gone"], "Group gone: There is no cell 'oven-1'.", "glue-1"),
+        (["LINE3-*"], "No cell has a name like 'LINE3-*'.", "line3-1"),
+    ],
+)
+def test_a_word_that_names_no_cell_is_refused_by_name(words, what, remedy):
+    with pytest.raises(ConfigError) as caught:
+        names_meant(words, CELLS, GROUPS)
+    assert caught.value.what == what
+    assert remedy in caught.value.remedy
+
+
+def test_the_nearer_group_of_a_name_counts_and_farther_groups_stay(places):
+    two = f'[cells.a]\nurl = "{URL}"\n[cells.b]\nurl = "{OTHER}"\n'
+    places["site"].write_text(f'[groups]\nnight = ["a"]\nall = ["*"]\n{two}')
+    places["user"].write_text('[groups]\nnight = ["b"]\n')
+    assert [cell.name for cell in select_cells(["@night"])] == ["b"]
+    assert [cell.name for cell in select_cells(["@all"])] == ["a", "b"]
+    assert [cell.name for cell in select_cells()] == ["a", "b"]
+    assert group_names() == ["night", "all"]
+
+
+def test_wrong_groups_are_told_by_their_key(tmp_path):
+    text = 'groups."a b" = ["x"]\ngroups.c = []\ngroups.d = "line3-*"\ngroups.e = ["x", 3]\n'
+    assert list(problems(tmp_path, text)) == ['groups."a b"', "groups.c", "groups.d", "groups.e.2"]
+    assert "groups.@d" not in problems(tmp_path, 'groups.d = ["@c"]\n')
+    told = problems(tmp_path, 'groups."@d" = ["x"]\n')
+    assert "must not contain blanks" in told['groups."@d"']
+    assert "groups" in problems(tmp_path, "group.c = ['x']\n")["group"]

@@ -1,70 +1,66 @@
 """cell check: unexpected changes of cells, and overdue checks. Moves nothing."""
 
-from collections.abc import Mapping, Sequence
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
+from robolink import errors
 from robolink.calibration_run import RecipeRun
-from robolink.config import Cell
-from robolink.errors import ConfigError, DeclinedError, NotReadyError, RobolinkError
-from robolink.inspection import InspectionFinding, measured_findings
+from robolink.config import (
+    Cell,
+    connect_cell,
+    load_cell_files,
+    proof_of_files,
+    use_journals_of,
+)
+from robolink.errors import ConfigError, DeclinedError, RobolinkError
+from robolink.inspection import (
+    CellCheck,
+    CheckFailure,
+    CheckState,
+    InspectionFinding,
+    check_cells,
+    inspect,
+    measured_findings,
+    record_check,
+)
 from robolink.messages import tr
 from robolink.model import Controller
 from robolink.recipe import LoadedRecipe, load_recipe
-from robolink_cli.access.cell import complete_cell
-from robolink_cli.console.exit_codes import DIFFERENT, exit_code
+from robolink_cli.access.cell import complete_cells, is_cell_name
+from robolink_cli.access.record import recording
+from robolink_cli.console.exit_codes import DIFFERENT, REFUSED, exit_code_of
 from robolink_cli.console.person import person_here
-from robolink_cli.console.render import emit, note, say
+from robolink_cli.console.render import emit, json_is_on, note, say
 from robolink_cli.options.consent import Published
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.session.completion import complete_recipe
-from robolink_cli.session.connection import open_controller
-from robolink_cli.session.context import CliContext, context_of_cell, optional_controller
+from robolink_cli.session.connection import open_controller, password_of
+from robolink_cli.session.context import (
+    CliContext,
+    context_of_cell,
+    context_with,
+    find_tools,
+    optional_controller,
+)
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+from robolink_cli.session.operator_identity import signature_of
+from robolink_cli.session.stop_listener import remember_address
 
 if TYPE_CHECKING:
     from robolink.backup import ToolState
+    from robolink.errors import NotReadyError
     from robolink.inspection import Inspection
-    from robolink.model import NewEntry
-
-
-class CheckScope(NamedTuple):
-    """What is checked, and how.
-
-    Attributes:
-        published: Whether the tools are those that the companion program published.
-        since: Changes before this day are left out of the charts; empty for none.
-        sensor: What measures besides, ``None`` for nothing: then nothing moves.
-    """
-
-    published: bool
-    since: str
-    sensor: "SensorCheck | None"
-
-
-class CheckedCell(NamedTuple):
-    """One cell that was checked, or could not be.
-
-    Attributes:
-        name: Its name, or its URL where it has none.
-        inspection: What was found; ``None`` where it could not be looked at.
-        error: Why not, or not further.
-    """
-
-    name: str
-    inspection: "Inspection | None"
-    error: RobolinkError | None = None
-
-    @property
-    def well(self) -> bool:
-        """Whether it was checked and needs no attention."""
-        found = self.inspection
-        return self.error is None and found is not None and not found.findings
 
 
 @click.command()
@@ -73,7 +69,7 @@ def check(
     context: CliContext,
     *,
     cells: Annotated[
-        tuple[str, ...], CliArgument(metavar="[CELL]...", shell_complete=complete_cell)
+        tuple[str, ...], CliArgument(metavar="[CELL]...", shell_complete=complete_cells)
     ] = (),
     since: Annotated[
         datetime | None,
@@ -96,162 +92,226 @@ def check(
 ) -> int:
     """Check cells for unexpected changes and overdue checks, for example nightly. Moves nothing.
 
-    Without CELL it checks the cell of -c, or else all cells of the cell files: tools against their
-    last confirmed values, due dates of stations, and the trend of the changes against its limits.
-    Each check is one entry in the journal. Exit code 1 when something needs attention; when a cell
-    could not be checked, the code that says why.
+    CELL is a name, a pattern in quotes ('line3-*') or a group of the cell file (@line3). Without
+    CELL it checks the cell of -c, or else all cells of the cell files, many at once: tools against
+    their last confirmed values, due dates of stations, and the trend of the changes against its
+    limits. Exit code 1 when something needs attention; when a cell could not be checked, the code
+    that says why; 5 when somebody was working at a cell.
     """
-    contexts = _contexts(context, cells)
-    sensor = None if recipe is None else SensorCheck.of(recipe, cells=len(contexts))
-    scope = CheckScope(published, f"{since:%Y-%m-%d}" if since else "", sensor)
-    checked = [_checked(one, scope) for one in contexts]
+    contexts, keep_days = _contexts(context, cells)
+    begin = f"{since:%Y-%m-%d}" if since else ""
+    tools = partial(find_tools, published=published)
+    if recipe is not None:
+        sensor = SensorCheck.of(recipe, cells=len(contexts))
+        checked: Sequence[CellCheck] = [_measured(contexts[0], tools, begin, keep_days, sensor)]
+    else:
+        checked = _checked(contexts, tools, begin, keep_days)
     payload = {"ok": all(one.well for one in checked), "cells": [_payload(one) for one in checked]}
     emit("check", payload, lambda: _show(checked))
+    return _exit_code(checked)
+
+
+def _exit_code(checked: Sequence[CellCheck]) -> int:
+    """Return what comes first: why a cell was not checked, then findings, then who is at work."""
     for one in checked:
-        if one.error is not None:
-            return exit_code(one.error)
-    return 0 if payload["ok"] else DIFFERENT
+        if one.state is CheckState.FAILED and one.failure is not None:
+            return exit_code_of(getattr(errors, one.failure.kind, RobolinkError))
+    states = {one.state for one in checked}
+    if CheckState.ATTENTION in states:
+        return DIFFERENT
+    return REFUSED if CheckState.BUSY in states else 0
 
 
-def _contexts(context: CliContext, names: Sequence[str]) -> list[CliContext]:
-    """Return each selected cell.
-
-    Raises:
-        ConfigError: There is none of that name, or none at all.
-    """
-    if not names:
-        if context.url is not None:
-            return [context]
-        from robolink.config import cell_names
-
-        names = cell_names()
-        if not names:
-            context.require_url()
-    return [context_of_cell(name) for name in names]
-
-
-def _checked(context: CliContext, scope: CheckScope) -> CheckedCell:
-    """Check one cell; the result names what prevented a check."""
-    name = context.cell.name if context.cell else context.require_url()
-    seen: list[Inspection] = []
-    try:
-        _inspect(context, scope, seen)
-    except RobolinkError as error:
-        if not (seen or isinstance(error, ConfigError)):
-            _record_that_nobody_looked(context, error)
-        return CheckedCell(name, seen[-1] if seen else None, error)
-    return CheckedCell(name, seen[-1])
-
-
-def _inspect(context: CliContext, scope: CheckScope, seen: "list[Inspection]") -> None:
-    """Check one cell and record the findings.
-
-    Args:
-        context: The cell.
-        scope: What is looked at, and how.
-        seen: Takes what was found; by reading, then with what was measured.
+def _contexts(context: CliContext, names: Sequence[str]) -> tuple[list[CliContext], int | None]:
+    """Return each selected cell, and for how many days checks are kept; ``None`` for all.
 
     Raises:
-        RobolinkError: What keeps it from being looked at, or from being looked at further.
+        ConfigError: A name, pattern or group means none, or there is none at all.
     """
-    from robolink.inspection import inspect
-    from robolink_cli.session.context import find_tools
-
-    with open_controller(context, quiet=True, changes=scope.sensor is not None) as controller:
-        tools: ToolState | NotReadyError
-        try:
-            tools = find_tools(controller, published=scope.published)
-        except NotReadyError as error:
-            tools = error
-        seen.append(inspect(controller, tools, cell=context.cell, since=scope.since))
-        try:
-            if scope.sensor is not None:
-                measured = scope.sensor.findings(controller, context.cell)
-                seen.append(seen[-1].with_findings(measured))
-        finally:
-            controller.outcomes.append(seen[-1].entry)
+    if not names and context.url is not None:
+        return [context], load_cell_files().keep_checks_days if context.cell else None
+    urls = [name for name in names if not is_cell_name(name)]
+    named = [name for name in names if is_cell_name(name)]
+    if urls and not named:
+        return [context_of_cell(url) for url in urls], None
+    files = load_cell_files()
+    cells = files.select(named)
+    if not (cells or urls):
+        context.require_url()
+    return [*map(context_with, cells), *map(context_of_cell, urls)], files.keep_checks_days
 
 
-def _record_that_nobody_looked(context: CliContext, error: RobolinkError) -> None:
-    """Record that a cell could not be checked; show it if that cannot be recorded."""
-    from robolink import __version__
-    from robolink.journal import open_log, signature_here
-    from robolink.transport import parse_url
+def _checked(
+    contexts: Sequence[CliContext],
+    tools: "Callable[[Controller], ToolState]",
+    since: str,
+    keep_days: int | None,
+) -> Sequence[CellCheck]:
+    """Check cells, and record that."""
+    targets = [one.cell or one.require_url() for one in contexts]
+    by_name = {one.cell.name if one.cell else one.require_url(): one for one in contexts}
+    use_journals_of(one.cell for one in contexts if one.cell is not None)
+    proof = proof_of_files()
+    signature = signature_of(contexts[0].operator, None, changes=False)
+    recorded = any(one.record for one in contexts)
+    with ExitStack() as stack:
 
-    try:
-        log = open_log(
-            parse_url(context.require_url()).address,
-            durable=True,
-            signature=signature_here(__version__),
+        def connect(target: Cell | str) -> Controller:
+            at = by_name[target if isinstance(target, str) else target.name]
+            controller = _connected(at, stack)
+            remember_address(at, proof)
+            return controller
+
+        tell = stack.enter_context(_progress(len(targets)))
+        return check_cells(
+            targets,
+            since=since,
+            tools=tools,
+            connect=connect,
+            signature=signature,
+            keep_days=keep_days,
+            progress=tell,
+            tell=note,
+            **({"at_once": 1} if recorded else {}),  # dialogues of several cells would mix
         )
-        try:
-            log.append(_not_looked(error))
-        finally:
-            log.close()
-    except ConfigError as broken:
-        note(broken.what)
 
 
-def _not_looked(error: RobolinkError) -> "NewEntry":
-    from robolink.model import EntryKind, NewEntry
+def _connected(context: CliContext, stack: ExitStack) -> Controller:
+    """Connect to one cell as the command's options and the cell's file say."""
+    import robolink
 
-    verdict = tr("The cell could not be checked: {what}", what=error.what)
-    return NewEntry(EntryKind.CHECK, verdict=verdict, details={"error": type(error).__name__})
+    url = context.require_url()
+    signature = signature_of(context.operator, context.expected, changes=False)
+    trace = stack.enter_context(recording(context.record, url.partition("?")[0]))
+    password = password_of(context)
+    if context.cell is None:
+        return robolink.connect(
+            url,
+            password=password,
+            timeout_s=context.timeout_s,
+            wait_s=context.wait_s,
+            trace=trace,
+            signature=signature,
+        )
+    return connect_cell(
+        context.cell,
+        password=password,
+        timeout_s=context.timeout_s,
+        wait_s=context.wait_s,
+        trace=trace,
+        signature=signature,
+    )
 
 
-def _payload(one: CheckedCell) -> Mapping[str, object]:
+_SHOWN: Final = 20
+"""Fewest cells of which progress is shown."""
+
+
+@contextmanager
+def _progress(cells: int) -> Iterator[Callable[[CellCheck], None]]:
+    """Show on a terminal how many cells were checked."""
+    if cells < _SHOWN or json_is_on() or not sys.stderr.isatty():
+        yield lambda _check: None
+        return
+    with click.progressbar(length=cells, label=tr("checking"), file=sys.stderr) as bar:
+        yield lambda _check: bar.update(1)
+
+
+def _measured(
+    context: CliContext,
+    tools: "Callable[[Controller], ToolState]",
+    since: str,
+    keep_days: int | None,
+    sensor: "SensorCheck",
+) -> CellCheck:
+    """Check one cell, measure its tips, and record both."""
+    seen: list[Inspection] = []
+    failure, reached = None, None
+    begun_s = time.monotonic()
+    try:
+        with open_controller(context, quiet=True, changes=True) as controller:
+            reached = controller
+            read: ToolState | NotReadyError
+            try:
+                read = tools(controller)
+            except errors.NotReadyError as error:
+                read = error
+            seen.append(inspect(controller, read, cell=context.cell, since=since))
+            measured = sensor.findings(controller, context.cell)
+            seen[0] = seen[0].with_findings(measured)
+    except RobolinkError as error:
+        failure = CheckFailure.of(error)
+    found = seen[0] if seen else None
+    called = context.cell.name if context.cell else context.require_url()
+    made = CellCheck(called, found, failure, time.monotonic() - begun_s)
+    signature = signature_of(context.operator, context.expected, changes=False)
+    target = context.cell or context.require_url()
+    return record_check(made, target, controller=reached, signature=signature, keep_days=keep_days)
+
+
+def _payload(one: CellCheck) -> Mapping[str, object]:
     """Return what is known of one cell; ``None`` for what could not be checked."""
-    from robolink.model import json_value
+    from robolink.model import json_fields, json_value
 
-    error = one.error and {
-        "kind": type(one.error).__name__,
-        "what": one.error.what,
-        "remedy": one.error.remedy,
-    }
     found = one.inspection
     tools = found and {str(number): json_value(it) for number, it in found.tools.items()}
     return {
-        "cell": one.name,
+        "cell": one.cell,
         "ok": one.well,
-        "error": error,
+        "state": str(one.state),
+        "error": one.failure and json_fields(one.failure, "kind", "what", "remedy"),
         "controller": found and found.controller,
         "tools": tools,
         "selected_tool": found and found.selected,
         "stations": found and list(found.stations),
         "changes": found and found.changes,
         "findings": [
-            {"code": f.code, "subject": f.subject, "sentence": f.sentence, "remedy": f.remedy}
-            for f in (found.findings if found else ())
+            json_fields(it, "code", "subject", "sentence", "remedy")
+            for it in (found.findings if found else ())
         ],
+        "elapsed_s": round(one.seconds, 3),
     }
 
 
-def _show(checked: Sequence[CheckedCell]) -> None:
+def _show(checked: Sequence[CellCheck]) -> None:
     """Print one line a cell, its findings below it; cells with findings first."""
     for one in sorted(checked, key=lambda one: one.well):
-        if one.inspection is None:
-            say(tr("{cell}: could not be checked.", cell=one.name))
-            say(f"  {one.error}")
+        found, failure = one.inspection, one.failure
+        if one.state is CheckState.BUSY and failure is not None:
+            say(tr("{cell}: somebody is working there; not checked.", cell=one.cell))
+            say(f"  {failure.what}")
             continue
-        if one.well:
+        if found is None:
+            say(tr("{cell}: could not be checked.", cell=one.cell))
+        elif one.well:
             say(
                 tr(
                     "{cell}: no problem found (tools read: {tools}, stations: {stations}, "
                     "measured changes on record: {changes}).",
-                    cell=one.name,
-                    tools=len(one.inspection.tools),
-                    stations=len(one.inspection.stations),
-                    changes=one.inspection.changes,
+                    cell=one.cell,
+                    tools=len(found.tools),
+                    stations=len(found.stations),
+                    changes=found.changes,
                 )
             )
-            continue
-        say(tr("{cell}: needs attention.", cell=one.name))
-        for found in one.inspection.findings:
-            say(f"  {found.sentence}")
-            if found.remedy:
-                say(f"    {found.remedy}")
-        if one.error is not None:
-            say(f"  {one.error}")
+        else:
+            say(tr("{cell}: needs attention.", cell=one.cell))
+            for finding in found.findings:
+                say(f"  {finding.sentence}")
+                if finding.remedy:
+                    say(f"    {finding.remedy}")
+        if failure is not None:
+            say(f"  {failure.what} {failure.remedy}".rstrip())
+    if len(checked) > 1:
+        counts = Counter(one.state for one in checked)
+        say(
+            tr(
+                "Cells: {cells}. No problem: {well}. Need attention: {attention}. Not checked: "
+                "{failed}. Busy: {busy}.",
+                cells=len(checked),
+                **{str(state): counts[state] for state in CheckState},
+            )
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -379,15 +380,30 @@ def check_lines_of_cells() -> Iterator[Remark]:
 
 
 def check_journal() -> Iterator[Remark]:
-    """List the interrupted jobs on any controller."""
-    from robolink.journal import default_location, may_exist, open_journal
+    """List the interrupted jobs on any controller, in each journal that the cell files name."""
+    from robolink.config import load_cell_files, use_journals_of
+    from robolink.journal import default_location
+    from robolink.transport import parse_url
+
+    addresses = [""]
+    with suppress(ConfigError):  # another remark is about wrong cell files
+        files = load_cell_files()
+        use_journals_of(files.cells.values(), files.journal)
+        addresses += [parse_url(cell.url).address for cell in files.cells.values()]
+    for location in dict.fromkeys(map(default_location, addresses)):
+        yield from _check_journal_at(location)
+
+
+def _check_journal_at(location: str) -> Iterator[Remark]:
+    from robolink.journal import may_exist, open_journal
     from robolink.model import begun_in_words
 
     try:
-        if not may_exist(default_location()):
+        if not may_exist(location):
             yield Remark("journal", Level.OK, tr("the journal is empty."))
             return
-        journal = open_journal(read_only=True)
+        journal = open_journal(location, read_only=True)
+        journal.require_unmoved()
         unsettled = journal.open_markers()
     except ConfigError as error:
         yield Remark("journal", Level.BAD, error.what, error.remedy)

@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
+from robolink_cli.access.cell import complete_cells
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.person import person_here
 from robolink_cli.console.render import emit, emit_json, json_is_on, note, say
@@ -173,7 +174,7 @@ def show(
 
     Options such as --timeout count: it shows the settings of a command with the same options.
     """
-    from robolink.config import find_cell, load_cells
+    from robolink.config import find_cell, load_cells, use_journals_of
     from robolink_cli.views.cells import cell_payload, cells_payload, show_cell, show_cells
 
     chosen = find_cell(cell) if cell else context.cell
@@ -181,18 +182,27 @@ def show(
         payload = cells_payload(load_cells().values())
         emit("config-cells", payload, lambda: show_cells(payload))
     else:
+        use_journals_of([chosen])
         payload = cell_payload(chosen, context, origin=origin)
         emit("config-show", payload, lambda: show_cell(payload))
 
 
 @click.command("list")
 @json_option
-def list_cells() -> None:
-    """List the cells that the cell files name, with their addresses."""
-    from robolink.config import load_cells
+def list_cells(
+    *,
+    cells: Annotated[
+        tuple[str, ...], CliArgument(metavar="[CELL]...", shell_complete=complete_cells)
+    ] = (),
+) -> None:
+    """List the cells that the cell files name, with their addresses; all, or those that you name.
+
+    CELL is a name, a pattern in quotes ('line3-*') or a group of the cell file (@line3).
+    """
+    from robolink.config import select_cells
     from robolink_cli.views.cells import cells_payload, show_cells
 
-    payload = cells_payload(load_cells().values())
+    payload = cells_payload(select_cells(cells))
     emit("cells", payload, lambda: show_cells(payload))
 
 

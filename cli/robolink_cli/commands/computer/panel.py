@@ -128,6 +128,7 @@ def _demo(stack: ExitStack) -> "DemoCells":
 
     cells = stack.enter_context(demo_cells())
     os.environ["ROBOLINK_STATE_DIR"] = str(cells.state)
+    os.environ["ROBOLINK_PLANT"] = ""  # what is done to these cells is copied nowhere
     stack.callback(os.chdir, os.getcwd())
     os.chdir(cells.folder)  # jobs find the recipes that lie there
     Pins().set(NOBODY, Secret(cells.pin))
@@ -170,11 +171,13 @@ def _served(cells_file: Path | None, names: tuple[str, ...], *, simulated: bool)
     Raises:
         ConfigError: A cell file is wrong, or there is no cell.
     """
-    from robolink.config import load_cells, settings_of_file
+    from robolink.config import load_cell_files, settings_of_file, use_journals_of
     from robolink_cli.panel.serving import Served
 
     only = None if cells_file is None else set(settings_of_file(cells_file))
-    found = {name: cell for name, cell in load_cells().items() if only is None or name in only}
+    files = load_cell_files()
+    use_journals_of(files.cells.values(), files.journal)
+    found = {name: cell for name, cell in files.cells.items() if only is None or name in only}
     for name, cell in tuple(found.items()):
         if "+sim://" in cell.url:
             del found[name]

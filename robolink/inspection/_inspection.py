@@ -1,8 +1,4 @@
-"""A check of a whole cell that moves nothing: is it as the last change left it, is anything due.
-
-For a job that runs every night, and for whoever comes to a cell in the morning
-(docs/accuracy.md).
-"""
+"""Compares a cell with its record: is it as the last change left it, is anything due."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,15 +15,12 @@ from robolink.model import (
     Controller,
     ControllerStatus,
     EntryKind,
-    NewEntry,
     ToolOffset,
     begun_in_words,
 )
 from robolink.stations import find_stations
 from robolink.timing import local_label
 from robolink.transaction import changed_since
-
-__all__ = ["Inspection", "InspectionCode", "InspectionFinding", "inspect", "measured_findings"]
 
 
 class InspectionCode(StrEnum):
@@ -84,29 +77,25 @@ class Inspection:
         return replace(self, findings=(*self.findings, *more))
 
     @property
-    def entry(self) -> NewEntry:
-        """The same for the record."""
-        found = [{"code": one.code, "subject": one.subject} for one in self.findings]
-        values = {
-            str(number): None if value is None else list(value.components())
-            for number, value in self.tools.items()
-        }
-        verdict = (
-            tr("Needs attention: {codes}.", codes=", ".join(one.code for one in self.findings))
-            if self.findings
-            else tr("No problem found.")
-        )
-        return NewEntry(
-            EntryKind.CHECK,
-            verdict=verdict,
-            details={
-                "findings": found,
-                "tools": values,
-                "selected_tool": self.selected,
-                "stations": list(self.stations),
-                "changes": self.changes,
+    def verdict(self) -> str:
+        """What was found, one sentence."""
+        if self.findings:
+            return tr("Needs attention: {codes}.", codes=", ".join(f.code for f in self.findings))
+        return tr("No problem found.")
+
+    @property
+    def details(self) -> dict[str, object]:
+        """The same for the record, plain JSON values."""
+        return {
+            "findings": [{"code": one.code, "subject": one.subject} for one in self.findings],
+            "tools": {
+                str(number): None if value is None else list(value.components())
+                for number, value in self.tools.items()
             },
-        )
+            "selected_tool": self.selected,
+            "stations": list(self.stations),
+            "changes": self.changes,
+        }
 
 
 def inspect(

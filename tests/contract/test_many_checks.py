@@ -1,0 +1,258 @@
+"""Many cells checked at once: over real sockets, with cells that are off, busy, slow or stopped."""
+
+import os
+import socket
+import threading
+from contextlib import ExitStack
+from dataclasses import replace
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+import robolink
+from robolink.backup import read_tools
+from robolink.config import add_cell, find_cell
+from robolink.errors import ConfigError
+from robolink.inspection import CellCheck, CheckState, check_cell, check_cells
+from robolink.journal import LeaseHolder, open_journal
+from robolink.journal._lease_view import this_process
+from robolink.model import Signature, ToolOffset
+from robolink.stopping import StopListener, holders_of
+from robolink.transport import far_end_of
+from tests.faults._requests import changes
+
+WELL, BUSY, FAILED = CheckState.WELL, CheckState.BUSY, CheckState.FAILED
+
+
+@pytest.fixture
+def line(tmp_path, monkeypatch):
+    """Four EPSON cells over TCP, in a cell file; gives the simulators by name."""
+    file = tmp_path / "robolink.toml"
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(file))
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    simulators = {f"press-{number}": EpsonSimulator(seed=number) for number in range(1, 5)}
+    with ExitStack() as stack:
+        for name, simulator in simulators.items():
+            host = stack.enter_context(serve_tcp(simulator))
+            add_cell(file, name, {"url": host.url, "timeout_s": 1.0})
+        yield simulators
+
+
+def cells(line):
+    return [find_cell(name) for name in line]
+
+
+def states(checks):
+    return {check.cell: check.state for check in checks}
+
+
+def why(check):
+    assert check.failure is not None
+    return check.failure
+
+
+def on_record():
+    return {one.cell: one for one in open_journal().checks(newest_first=False)}
+
+
+@pytest.fixture
+def silent():
+    """The URL of an address that takes no connection and refuses none: its queue is full."""
+    with ExitStack() as stack:
+        listening = stack.enter_context(socket.socket())
+        listening.bind(("127.0.0.1", 0))
+        listening.listen(0)
+        for _ in range(2):
+            waiting = stack.enter_context(socket.socket())
+            waiting.setblocking(False)
+            waiting.connect_ex(listening.getsockname())
+        yield f"epson+tcp://127.0.0.1:{listening.getsockname()[1]}"
+
+
+def test_cells_are_told_in_their_order_and_recorded_and_not_touched(line):
+    seen: list[CellCheck] = []
+    checks = check_cells(cells(line), progress=seen.append, signature=Signature(operator="4711"))
+    assert [check.cell for check in checks] == list(line)
+    assert {*states(checks).values()} == {WELL}
+    assert sorted(seen, key=lambda check: check.cell) == list(checks)
+    assert {name: one.well for name, one in on_record().items()} == dict.fromkeys(line, True)
+    assert on_record()["press-1"].signature.operator == "4711"
+    names = {one.controller for one in on_record().values()}
+    assert len(names) == 4
+    assert all(name.startswith("epson:") for name in names)
+    assert open_journal().verify().problems == ()
+    for simulator in line.values():
+        requests = [text for _, way, text in simulator.log if way == ">"]
+        assert changes(requests) == []
+        assert requests[-1].startswith("$Logout")
+
+
+def test_cells_that_are_off_keep_no_other_from_being_checked(line, silent):
+    off = ["epson+tcp://127.0.0.1:1", silent]
+
+    def connect(cell):
+        if isinstance(cell, str):
+            return robolink.connect(cell, timeout_s=0.3)
+        return robolink.connect(cell.url)
+
+    checks = check_cells([*off, *cells(line)], connect=connect)
+    assert [check.state for check in checks] == [FAILED, FAILED, WELL, WELL, WELL, WELL]
+    assert [why(check).kind for check in checks[:2]] == ["ConnectError", "ConnectError"]
+    assert all(check.seconds < 3 for check in checks)
+    (first, second) = [one for one in open_journal().checks() if not one.well]
+    assert {first.controller, second.controller} == set(off)
+    assert first.details["error"] == "ConnectError"
+
+
+def test_a_cell_whose_lease_somebody_has_is_busy_and_is_not_connected_to(line):
+    check_cells(cells(line))  # they are known from here on
+    url = find_cell("press-2").url
+    own = this_process()
+    holder = LeaseHolder(os_user="ann", host="pc-7", pid=own.pid, boot=own.boot)
+    asked = len(line["press-2"].log)
+    with open_journal().log(url, holder=holder).hold("a needle change"):
+        checks = check_cells(cells(line))
+    assert states(checks) == {**dict.fromkeys(line, WELL), "press-2": BUSY}
+    assert "a needle change" in why(checks[1]).what
+    assert "ann" in why(checks[1]).what
+    assert why(checks[1]).kind == "BusyError"
+    assert len(line["press-2"].log) == asked
+    assert on_record()["press-2"].details["error"] == "BusyError"
+
+
+def test_a_cell_that_a_process_here_has_is_busy_by_name(line):
+    url = find_cell("press-3").url
+    with (
+        robolink.connect(url) as controller,
+        StopListener(controller, url, who="ann ('robolink jog')") as listener,
+    ):
+        # A card of this process is its own; the name of the file says whose it is.
+        card = listener._card
+        card.rename(card.with_name(f"{os.getppid()}-other.json"))
+        checks = check_cells(cells(line))
+        card.with_name(f"{os.getppid()}-other.json").rename(card)
+    assert states(checks) == {**dict.fromkeys(line, WELL), "press-3": BUSY}
+    assert "ann ('robolink jog') is working on it." in why(checks[2]).what
+
+
+def test_a_login_that_nobody_here_has_is_told_as_what_it_is(line):
+    with robolink.connect(find_cell("press-1").url):
+        (check,) = check_cells(cells(line)[:1])
+    assert (check.state, why(check).kind) == (FAILED, "LoginUnansweredError")
+
+
+def test_a_check_takes_no_lease_and_no_mailbox_so_a_change_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    with serve_modbus_tcp(SoftMotionSimulator(seed=3)) as host:
+
+        def tools(controller):
+            with robolink.connect(host.url) as other:
+                other.tools.write(2, ToolOffset(5, 6, -70), expected=None)
+            return read_tools(controller)
+
+        check = check_cell(host.url, tools=tools)
+    assert check.state is WELL
+    assert check.inspection is not None
+    assert check.inspection.tools[2] == ToolOffset(5, 6, -70)
+
+
+def test_a_stop_from_another_terminal_reaches_the_cell_that_is_checked(line):
+    told = []
+    url = find_cell("press-2").url
+
+    def tools(controller):
+        if controller.identity == url:
+            (holder,) = holders_of(far_end_of(url))
+            assert "a check of cells" in holder.who
+            told.append(holder.ask_to_stop("K. Sato"))
+        return read_tools(controller)
+
+    heard: list[str] = []
+    checks = check_cells(cells(line), tools=tools, tell=heard.append)
+    assert states(checks) == {**dict.fromkeys(line, WELL), "press-2": FAILED}
+    assert why(checks[1]).kind == "StoppedError"
+    assert told == ["ready"]
+    assert any("stopped from another terminal by K. Sato" in one for one in heard)
+    assert list(holders_of(far_end_of(url))) == []
+
+
+def test_a_command_waits_for_the_check_of_its_cell(line, capsys):
+    """A change is not kept out by the login of a check that another process makes."""
+    url, checked = find_cell("press-2").url, threading.Event()
+    commands: list[threading.Thread] = []
+    codes: list[int] = []
+
+    def tools(controller):
+        if controller.identity == url:
+            (holder,) = holders_of(far_end_of(url))
+            other = holder.card.with_name(f"{os.getppid()}-other.json")
+            other.write_bytes(holder.card.read_bytes())  # as another process would see it
+            beside = threading.Thread(target=lambda: codes.append(set_tool()))
+            commands.append(beside)
+            beside.start()
+            assert not checked.wait(0.2)
+            assert codes == []
+            other.unlink()
+        return read_tools(controller)
+
+    def set_tool():
+        return main.run(["-c", "press-2", "--wait", "5", "tool", "set", "1", "--x", "12.5"])
+
+    assert {*states(check_cells(cells(line), tools=tools)).values()} == {WELL}
+    for beside in commands:
+        beside.join(30)
+    assert codes == [0]
+
+
+def test_a_cell_that_takes_too_long_is_told_and_waited_for_no_longer(line):
+    slow, release = find_cell("press-1").url, threading.Event()
+
+    def tools(controller):
+        if controller.identity == slow:
+            assert release.wait(30)
+        return read_tools(controller)
+
+    def progress(check):
+        if check.cell == "press-1":
+            release.set()
+
+    checks = check_cells(cells(line), tools=tools, deadline_s=0.3, progress=progress)
+    assert states(checks) == {**dict.fromkeys(line, WELL), "press-1": FAILED}
+    assert why(checks[0]).what == "The check took longer than 0.3 s."
+    assert not on_record()["press-1"].well
+
+
+def test_ctrl_c_ends_it_in_order_and_what_was_finished_is_on_record(line):
+    def progress(check):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        check_cells(cells(line), progress=progress, at_once=2)
+    assert 1 <= len(on_record()) <= 2
+    for simulator in line.values():
+        requests = [text for _, way, text in simulator.log if way == ">"]
+        assert not requests or requests[-1].startswith("$Logout")
+    assert not [one for one in threading.enumerate() if one.name.startswith("robolink-check")]
+
+
+def test_a_journal_that_cannot_be_used_fails_each_check_by_name(line, monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOLINK_JOURNAL", str(tmp_path))
+    checks = check_cells(cells(line))
+    assert {why(check).kind for check in checks} == {"JournalError"}
+
+
+def test_a_name_that_is_no_cell_is_refused_before_any_is_asked(line):
+    with pytest.raises(ConfigError, match="no cell 'press-9'"):
+        check_cells(["press-1", "press-9"])
+    assert [len(simulator.log) for simulator in line.values()] == [0, 0, 0, 0]
+
+
+def test_a_check_is_compared_by_its_result_and_not_by_its_time(line):
+    check = check_cell("press-1")
+    assert isinstance(check, CellCheck)
+    assert check == replace(check, seconds=99.0)
+    assert check.well

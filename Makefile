@@ -25,6 +25,7 @@ help: ## Show what can be made.
 .PHONY: demo
 demo: $(VENV)/.installed ## Install robolink and show a nozzle change on a simulated robot.
 	$(BIN)/robolink demo
+	@echo "Twenty cells, and an agent that is killed twice: $(BIN)/robolink fleet demo"
 
 .PHONY: test
 test: check ## Install everything, check the sources and run the tests.
@@ -95,6 +96,14 @@ PARTS :=
 .PHONY: nightly
 nightly: $(VENV)/.installed-dev ## Run all that make test leaves out, and print one table of how it ended.
 	@NIGHT=$(NIGHT) $(BIN)/python tools/nightly.py $(PARTS)
+
+# N=50000 takes a night: 25 rounds of 2,000 cells. DATABASE=postgresql starts a server of its own.
+N ?= 200
+KILLS := 6
+DATABASE := sqlite
+.PHONY: fleet
+fleet: $(VENV)/.installed-dev ## Write an offset at N=200 simulated cells while the agent is killed, and count.
+	$(BIN)/python -m tests.fleet.campaign --cells $(N) --kills $(KILLS) --database $(DATABASE)
 
 .PHONY: windows
 windows: $(VENV)/.installed-dev ## Run the wheel on a Windows CPython under wine, as far as that goes.
@@ -191,7 +200,7 @@ $(VENV)/.installed-browser: $(VENV)/.installed-dev
 	touch $@
 
 $(VENV)/.installed: pyproject.toml $(VENV)/.created
-	$(BIN)/python -m pip install --quiet --editable '.[panel,eye]'
+	$(BIN)/python -m pip install --quiet --editable '.[panel,eye,fleet]'
 	touch $@
 
 $(VENV)/.created:

@@ -17,6 +17,7 @@ _RECENT: Final = "of what meets a network, only releases of the last two years a
 REASONS: Final[Mapping[str, str]] = {
     "canopen": _OLDER,
     "cryptography": _RECENT,
+    "dbos": "its gaps were looked at in this release (docs/decisions/0072)",
     "jinja2": "the releases beneath have a published way out of the sandbox (CVE-2025-27516)",
     "keyring": _OLDER,
     "lark": _OLDER,
@@ -32,6 +33,7 @@ REASONS: Final[Mapping[str, str]] = {
     "pyserial": "it is the last release; the one before is of 2017",
     "python-can": "4.2 imports pkg_resources, which an environment of today need not have",
     "rich": _OLDER,
+    "sqlalchemy": "dbos asks for this release or a later one",
     "starlette": "1.0 is the first release whose interface is promised to stay",
     "uvicorn": "the releases beneath take no context of TLS that was made before",
     "websockets": _RECENT,

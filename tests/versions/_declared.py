@@ -21,7 +21,7 @@ UNTRIED: Final = {
     "newest-3.14": frozenset(
         {
             *("cryptography", "starlette", "uvicorn", "websockets"),
-            *("opencv-python-headless", "pillow"),
+            *("opencv-python-headless", "pillow", "dbos", "sqlalchemy"),
         }
     )
 }

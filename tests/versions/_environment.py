@@ -38,6 +38,7 @@ CHOSEN: Final = (
     "tests/cli/test_report_command.py",
     "tests/cli/wizard",
     "tests/eye",
+    "tests/fleet",
     "tests/panel/access/test_tls_product.py",
     "tests/panel/server",
     "tests/unit/structured_text/test_st_language.py",

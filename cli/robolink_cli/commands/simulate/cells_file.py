@@ -294,8 +294,8 @@ KINDS: Final[Mapping[str, SimulatedKind]] = {
 
 CELLS_FILE: Final = FileKind(
     named=lambda path: tr("The file of simulated cells {path}", path=path),
-    unreadable_remedy=lambda: tr("docs/simulated-fleet.md has an example."),
-    wrong_remedy=lambda: tr("Correct it; docs/simulated-fleet.md explains every key."),
+    unreadable_remedy=lambda: tr("docs/fleet.md has an example."),
+    wrong_remedy=lambda: tr("Correct it; docs/fleet.md explains every key."),
 )
 
 _OWN_KEYS: Final = ("kind", "count", "assist")

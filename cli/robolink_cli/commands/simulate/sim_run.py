@@ -48,7 +48,7 @@ def sim_run(
     """Serve many simulated controllers of all kinds, listed in a file, until Ctrl-C.
 
     The first line names every cell with its URLs, its control URL and the folder for its clients'
-    records; with --json it is one JSON document. docs/simulated-fleet.md explains the file.
+    records; with --json it is one JSON document. docs/fleet.md explains the file.
     """
     from robolink_cli.commands.simulate.cells_file import read_cells
 

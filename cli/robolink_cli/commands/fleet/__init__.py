@@ -1,0 +1,1 @@
+"""Commands for plans of many cells."""

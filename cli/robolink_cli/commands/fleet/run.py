@@ -1,0 +1,95 @@
+"""fleet run: a plan is started, and carried out here where no agent runs."""
+
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from robolink.errors import LeaseHeldError
+from robolink.fleet.errors import PlanError
+from robolink.messages import tr
+from robolink_cli.commands.fleet.agent import Backups, ended_by_signals, made_agent
+from robolink_cli.commands.fleet.plant import Operator, PlanId, open_plant, who
+from robolink_cli.console.exit_codes import DIFFERENT, DONE, UNKNOWN
+from robolink_cli.console.render import emit, say
+from robolink_cli.options.shared import json_option
+from robolink_cli.views.fleet import progress_payload, show_progress
+
+if TYPE_CHECKING:
+    from robolink.fleet import FleetStore, Plan, PlanProgress
+
+
+_SHOWN: Final = ("plan", "finished", "states", "halts")
+
+
+@click.command("run", short_help="Start a plan; carry it out here if no agent runs.")
+@json_option
+def run(*, plan: PlanId, backups: Backups = None, operator: Operator = None) -> int:
+    """Start PLAN. If an agent of its plant runs, that one carries it out, and this ends at once.
+
+    Otherwise this command is the agent until the plan is finished or waits for a person. Exit code
+    1 when cells ended otherwise than asked, or the plan is halted; 6 when one is unsettled.
+    """
+    with open_plant() as store:
+        found = store.plan(plan)
+        require_unattended(found)
+        agent = made_agent(found.plant, backups)
+        start(store, plan, who(operator))
+        holder = ""
+        try:
+            with ended_by_signals(agent):
+                agent.run_until_still()
+        except LeaseHeldError as error:
+            holder = error.holder
+        progress = store.progress(plan)
+    emit("fleet-run", _payload(progress, holder), lambda: _show(progress, holder))
+    return DONE if holder else _code(progress)
+
+
+def require_unattended(plan: "Plan") -> None:
+    """Refuse a plan that no agent carries out.
+
+    Raises:
+        PlanError: It moves robots.
+    """
+    if plan.kind.moves:
+        raise PlanError(
+            tr(
+                "Plan {plan} ({kind}) moves robots, which no agent does: each cell needs a yes.",
+                plan=plan.id,
+                kind=plan.kind,
+            ),
+            remedy=tr(
+                "Nothing was started. At each cell, type: robolink -c CELL change RECIPE "
+                "--order {order}",
+                order=plan.order("CELL"),
+            ),
+        )
+
+
+def start(store: "FleetStore", plan: str, by: str) -> None:
+    """Start a plan that was not started yet."""
+    first = [halt for halt in store.progress(plan).standing if halt.numbers.get("ring") == 0]
+    if first:
+        store.resume(plan, by, tr("started"))
+
+
+def _payload(progress: "PlanProgress", holder: str) -> dict[str, object]:
+    """Return which other process carries the plan out, if one does, and how the plan stands."""
+    said = progress_payload(progress)
+    return {"agent": holder or None} | {key: said[key] for key in _SHOWN}
+
+
+def _show(progress: "PlanProgress", holder: str) -> None:
+    show_progress(progress)
+    if holder:
+        say(tr("{who} carries it out.", who=holder))
+
+
+def _code(progress: "PlanProgress") -> int:
+    from robolink.fleet import JobState
+
+    counts = progress.counts()
+    if counts[JobState.UNSETTLED]:
+        return UNKNOWN
+    others = [state for state in counts if state.final and not state.answered]
+    return DIFFERENT if others or progress.standing else DONE

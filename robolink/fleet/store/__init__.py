@@ -1,0 +1,1 @@
+"""The plant's database: plans, their outcomes, halts and permits."""

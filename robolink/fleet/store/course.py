@@ -1,0 +1,226 @@
+"""One plan inside a transaction: what holds it back, how its jobs end, and when it halts."""
+
+from datetime import datetime
+
+from robolink.fleet.errors import PlanError
+from robolink.fleet.halts import EndedJob, HaltFinding, HaltRule, RingTally, broken_rule, stage_of
+from robolink.fleet.outcome_codes import MOST_TRIES, Treatment
+from robolink.fleet.plans import Plan
+from robolink.fleet.progress import CellJob, Halt, JobOutcome, RecordedOutcome, WaitFacts
+from robolink.fleet.states import JobState, PlanKind
+from robolink.fleet.store import statements
+from robolink.fleet.store.rows import (
+    accepted_in,
+    evidence_in,
+    label_of,
+    read_halt,
+    read_job,
+    read_permit,
+)
+from robolink.fleet.windows import Window
+from robolink.journal.store.chain import canonical, storable
+from robolink.journal.store.connection import DatabaseConnection
+from robolink.messages import known_names, tr
+
+
+class PlanCourse:
+    """A plan whose lock a transaction has.
+
+    Attributes:
+        plan: The plan.
+        now: The time, with its zone.
+        label: The same as it is stored.
+
+    Args:
+        database: The connection, within the transaction.
+        plan: The plan.
+        now: The time.
+    """
+
+    def __init__(self, database: DatabaseConnection, plan: Plan, now: datetime) -> None:
+        self._database = database
+        self.plan, self.now, self.label = plan, now, label_of(now)
+
+    def job(self, cell: str) -> CellJob:
+        """Return a cell's job.
+
+        Raises:
+            PlanError: The plan has no such cell.
+        """
+        rows = self._database.rows(statements.JOB, {"plan": self.plan.id, "cell": cell})
+        if rows:
+            return read_job(rows[0])
+        raise PlanError(
+            tr("Plan {plan} has no cell {cell}.", plan=self.plan.id, cell=cell),
+            remedy=known_names(self.plan.cells, cell),
+        )
+
+    def facts(self, busy: frozenset[str]) -> WaitFacts:
+        """Return what holds the jobs back.
+
+        Args:
+            busy: Cells at which jobs of other plans run.
+        """
+        standing = self.standing()
+        ((ring,),) = self._database.rows(statements.OPEN_RING, {"plan": self.plan.id})
+        ((running,),) = self._database.rows(statements.RUNNING, {"plan": self.plan.id})
+        permitted = not self.plan.needs_permit or any(
+            read_permit(row).holds(self.plan, self.label)
+            for row in self._database.rows(statements.PERMITS_OF, {"plant": self.plan.plant})
+        )
+        ring = len(self.plan.rings) if ring is None else int(ring)
+        rules = [halt.rule for halt in standing]
+        return WaitFacts(
+            halt=next(
+                (rule for rule in rules if rule is not HaltRule.PAUSE), rules[0] if rules else None
+            ),
+            ring=ring,
+            window_open=self.plan.window_open(self.now.astimezone()),
+            permitted=permitted,
+            running=int(running),
+            most=self.plan.most_at_once(ring),
+            busy=busy,
+        )
+
+    def miss(self) -> None:
+        """End the jobs whose window closed before their cells could be reached."""
+        if not self.plan.window:
+            return
+        window, now = Window.parse(self.plan.window), self.now.astimezone()
+        for row in self._database.rows(statements.VAIN_JOBS, {"plan": self.plan.id}):
+            job = read_job(row)
+            begun = datetime.fromisoformat(job.begun_at).astimezone(now.tzinfo)
+            if now >= window.end_after(begun):
+                said = JobOutcome(job.code or 0, job.error, job.reason, job.what)
+                assert job.treatment is not None  # noqa: S101 - of a vain job
+                self.end(job, JobState.MISSED, job.treatment, said)
+
+    def end(
+        self,
+        job: CellJob,
+        state: JobState,
+        treatment: Treatment,
+        outcome: JobOutcome,
+    ) -> RecordedOutcome:
+        """Store an end, free the cell, and check the rules.
+
+        Args:
+            job: The job.
+            state: Its state from now on.
+            treatment: What its end means.
+            outcome: How it ended.
+        """
+        end = EndedJob(state, treatment, outcome.corrections)
+        judged = state.answered and end.judged
+        sequence = self.last_sequence() + 1 if state.final else 0
+        corrections = [one.as_json() for one in outcome.corrections]
+        values = {
+            "plan": self.plan.id,
+            "cell": job.cell,
+            "state": str(state),
+            "at": self.label,
+            "code": outcome.code,
+            "error": outcome.error,
+            "reason": outcome.reason,
+            "what": storable(outcome.what),
+            "change": outcome.change,
+            "treatment": str(treatment),
+            "judged": int(judged),
+            "corrections": canonical(corrections) if corrections else "",
+            "sequence": sequence,
+        }
+        self._database.run(statements.END_JOB, values)
+        cell = {"plant": self.plan.plant, "cell": job.cell, "order_id": self.plan.order(job.cell)}
+        self._database.run(statements.FREE_CELL, cell)
+        halt = self._checked(job, end) if state.final else None
+        return RecordedOutcome(self.job(job.cell), halt)
+
+    def _checked(self, job: CellJob, end: EndedJob) -> Halt | None:
+        """Halt the plan if an end breaks a rule, or pause it behind a ring."""
+        accepted, until = accepted_in(self._database, self.plan.id)
+        counts = self._database.rows(statements.COUNTS, {"plan": self.plan.id, "after": until})
+        stage = stage_of(self.plan.sizes, job.ring)
+        of_ring = {JobState(state): int(n) for ring, state, n, _, _ in counts if ring == job.ring}
+        answered = sum(n for state, n in of_ring.items() if state.answered)
+        tally = RingTally(
+            rings=self.plan.sizes,
+            ring=job.ring,
+            ended=sum(n for state, n in of_ring.items() if state.final),
+            answered=answered,
+            refused=of_ring.get(JobState.REFUSED, 0),
+            stage_ended=sum(int(n) for ring, _, _, n, _ in counts if ring in stage),
+            expected_refusals=0.0 if self.plan.kind.reads else self.plan.expected_refusals,
+        )
+        where = {"plan": self.plan.id, "after": until, "first": stage[0], "last": stage[-1]}
+        finding = broken_rule(end, tally, lambda: evidence_in(self._database, where), accepted)
+        if (
+            finding is None
+            and tally.ended == self.plan.sizes[job.ring]
+            and job.ring + 1 < len(self.plan.rings)
+        ):
+            known = sum(int(n) for ring, _, _, _, n in counts if ring == job.ring)
+            if not self.plan.auto or (known < answered and not self.plan.kind.reads):
+                finding = HaltFinding(HaltRule.PAUSE, {"ring": job.ring + 1, "cells": tally.ended})
+        if finding is None:
+            return None
+        return self.add_halt(finding, cell=job.cell)
+
+    def add_halt(
+        self,
+        finding: HaltFinding,
+        *,
+        cell: str = "",
+        by: str = "",
+    ) -> Halt | None:
+        """Halt the plan, unless it is halted: two outcomes at once halt it once.
+
+        Args:
+            finding: The rule, and what it was found by.
+            cell: The cell whose end broke it.
+            by: Who halts it, where a person does.
+
+        Returns:
+            The new halt; ``None`` where it is halted already.
+        """
+        if any(halt.rule is not HaltRule.PAUSE for halt in self.standing()):
+            return None
+        values = {
+            "plan": self.plan.id,
+            "at": self.label,
+            "rule": str(finding.rule),
+            "cell": cell,
+            "numbers": canonical(dict(finding.numbers)),
+            "by_whom": storable(by),
+        }
+        self._database.run(statements.ADD_HALT, values)
+        return self.standing()[-1]
+
+    def standing(self) -> list[Halt]:
+        """Return the halts that nobody has lifted."""
+        return [
+            read_halt(row)
+            for row in self._database.rows(statements.STANDING, {"plan": self.plan.id})
+        ]
+
+    def last_sequence(self) -> int:
+        """Return the number of the last end of a job."""
+        ((last,),) = self._database.rows(statements.LAST_SEQUENCE, {"plan": self.plan.id})
+        return int(last)
+
+
+def state_after(kind: PlanKind, treatment: Treatment, attempt: int) -> JobState:
+    """Return the state of a job whose attempt ended.
+
+    Args:
+        kind: What it does.
+        treatment: What the end means.
+        attempt: The number of the attempt.
+    """
+    if treatment.again:
+        return JobState.WAITING if attempt < MOST_TRIES else JobState.MISSED
+    match treatment:
+        case Treatment.DONE:
+            return JobState.UNPROVED if kind is PlanKind.OFFSET else JobState.KEPT
+        case Treatment.UNSETTLED:
+            return JobState.UNSETTLED
+    return JobState.REFUSED

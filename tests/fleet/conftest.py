@@ -1,0 +1,96 @@
+"""Both kinds of database of a plant, empty for each test, and a clock that a test moves."""
+
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from robolink.fleet import FleetStore
+from tests.contract.journal._postgresql import Server, is_installed, served
+
+
+class Wall:
+    """A wall clock that stands still until it is moved."""
+
+    def __init__(self) -> None:
+        self.now = datetime(2026, 11, 30, 23, 0, tzinfo=UTC)
+
+    def __call__(self) -> datetime:
+        return self.now
+
+    def go_on(self, **by: float) -> None:
+        self.now += timedelta(**by)
+
+
+@pytest.fixture
+def wall() -> Wall:
+    return Wall()
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[Server]:
+    """A PostgreSQL server."""
+    if not is_installed():
+        pytest.skip("PostgreSQL is not installed here: initdb and postgres are missing")
+    with served() as server:
+        yield server
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.soak)])
+def location(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """The address of an empty database."""
+    if request.param == "sqlite":
+        return str(tmp_path / "plant.db")
+    server: Server = request.getfixturevalue("server")
+    server.execute("DROP SCHEMA IF EXISTS fleet CASCADE")
+    return server.url()
+
+
+@pytest.fixture
+def open_store(location: str, wall: Wall) -> Iterator[Callable[[], FleetStore]]:
+    """Opens the database on a connection of its own, as another process would."""
+    opened: list[FleetStore] = []
+
+    def open_it() -> FleetStore:
+        opened.append(FleetStore(location, clock=wall))
+        return opened[-1]
+
+    yield open_it
+    for store in opened:
+        store.close()
+
+
+@pytest.fixture
+def store(open_store: Callable[[], FleetStore]) -> FleetStore:
+    return open_store()
+
+
+@pytest.fixture
+def fresh_seed() -> int:
+    """A seed that no run had; a failure shows it."""
+    return secrets.randbelow(10**9)
+
+
+@pytest.fixture
+def server_of(request: pytest.FixtureRequest) -> Callable[[str], AbstractContextManager[None]]:
+    """Takes the database of a location away during a block."""
+
+    @contextmanager
+    def away(location: str) -> Iterator[None]:
+        if "://" in location:
+            server: Server = request.getfixturevalue("server")
+            server.stop()
+            try:
+                yield
+            finally:
+                server.start()
+            return
+        hidden = Path(location).with_suffix(".hidden")
+        Path(location).rename(hidden)
+        yield
+        hidden.rename(location)
+
+    return away

@@ -27,6 +27,7 @@ class RemedyWord:
     COLUMNS: Final = "columns"
     DIALOGUE_FILE: Final = "DialogueLog"
     EARLIER_VALUE: Final = "to=NUMBER"
+    END_HOLDER: Final = "robolink.stopping.end_process"
     EULER: Final = "euler"
     EXPORT_JOURNAL: Final = "open_journal(..., read_only=True)"
     FORGET_MARKER: Final = "recover(..., confirm=...)"

@@ -210,6 +210,8 @@ def import_all() -> None:
             if not module.name.endswith("__main__"):
                 with suppress(ImportError):  # of another system
                     import_module(module.name)
+    with suppress(ImportError):  # without the extra
+        import_module("robolink.fleet.agent")
     from robolink_simulators.epson.spel.parser import parse
 
     parse("Motor On")  # its grammar is read once

@@ -16,6 +16,7 @@ SIMULATE: Final = "robolink_cli.commands.simulate"
 COMPUTER: Final = "robolink_cli.commands.computer"
 COMPANIONS: Final = "robolink_cli.commands.companions"
 SHIPPED: Final = "robolink_cli.commands.shipped"
+FLEET: Final = "robolink_cli.commands.fleet"
 GROUPS: Final = "robolink_cli.commands.groups"
 
 
@@ -49,7 +50,10 @@ _MEASURE_AND_MOVE: Final = {
 }
 
 _LOOK_BACK: Final = {
-    "journal": (f"{RECORD}.journal:journal", "list show diff drift report export verify"),
+    "journal": (
+        f"{RECORD}.journal:journal",
+        "list show checks diff drift report export verify sync",
+    ),
 }
 
 _SET_UP: Final = {
@@ -76,11 +80,12 @@ SHORT_NAMES: Final = {
     "docs": f"{SHIPPED}.docs:docs",
     "expert": f"{GROUPS}:expert",
     "eye": f"{MEASURE}.eye:eye",
+    "fleet": f"{FLEET}.command:fleet",
     "recipe": f"{SHIPPED}.recipe:recipe",
 }
 """Names that work but are not listed; the line below the list names ``demo``. ``check``,
-``check-contract``, ``demo``, ``docs``, ``eye`` and ``recipe`` are short for commands listed under
-``cell`` and ``expert``. The former commands of ``config`` name their replacements.
+``check-contract``, ``demo``, ``docs``, ``eye``, ``fleet`` and ``recipe`` are short for commands
+listed under ``cell`` and ``expert``. The former commands of ``config`` name their replacements.
 """
 
 RENAMED: Final = {

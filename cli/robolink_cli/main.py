@@ -74,7 +74,12 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
         last: Whether the process ends then.
     """
     with speaking_for(arguments):
-        return _guarded(lambda: _answer(arguments), last=last)
+        try:
+            return _guarded(lambda: _answer(arguments), last=last)
+        finally:
+            # The next line of the same process may be about other cells, or none.
+            if places := sys.modules.get("robolink.journal._places"):
+                places.name_journals({}, afresh=True)
 
 
 def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
@@ -131,10 +136,23 @@ def _answer(arguments: Sequence[str]) -> int:
     before, code = _logs().logs_open() if _logs() else 0, None
     try:
         code = _ended(arguments)
+        _copy_to_the_plant()
     finally:
         if logs := _logs():
             logs.close_logs(beyond=before, code=code)
     return code
+
+
+def _copy_to_the_plant() -> None:
+    """Copy what the command recorded; however that goes, the command has ended as it has."""
+    connections = sys.modules.get("robolink.journal._connections")
+    journals = connections.journals_added_to() if connections else ()
+    if not journals:
+        return
+    from robolink_cli.session.plant_outbox import copy_at_the_end
+
+    with suppress(Exception, KeyboardInterrupt):
+        copy_at_the_end(journals)
 
 
 def _logs() -> "Any":  # noqa: ANN401 - a module

@@ -16,6 +16,7 @@ WIDTH, LEFT, TOP, HEIGHT, GAP = 1080, 46, 20, 44, 8
 COLOURS = {"robolink_cli": "#fde8c8", "robolink_simulators": "#dcecd8", "robolink": "#eef2f8"}
 
 WORDS = {
+    "fleet": "plans of many cells: rings, outcomes, halts",
     "testing": "what every kind of controller is held to",
     "files": "of robolink, of people, by name",
     "closing": "what is closed",

@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.rotations import zyz_deg as zyz_deg
     from robolink.calibration.core.statistics import NORMAL_95 as NORMAL_95
     from robolink.calibration.core.statistics import chi_square_quantile as chi_square_quantile
+    from robolink.calibration.core.statistics import f_exceeded as f_exceeded
     from robolink.calibration.core.statistics import f_quantile as f_quantile
     from robolink.calibration.core.statistics import normal_quantile as normal_quantile
     from robolink.calibration.core.statistics import shifted_half95 as shifted_half95
@@ -321,7 +322,7 @@ else:
                 "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg"
             ),
             "core.statistics": (
-                "NORMAL_95 chi_square_quantile f_quantile normal_quantile "
+                "NORMAL_95 chi_square_quantile f_exceeded f_quantile normal_quantile "
                 "shifted_half95 shifted_region95 student_t studentized_range_0999"
             ),
             "core.turn_claim": (

@@ -47,8 +47,10 @@ if TYPE_CHECKING:
     from robolink.model._journal_entries import PROOFS as PROOFS
     from robolink.model._journal_entries import AnsweredBy as AnsweredBy
     from robolink.model._journal_entries import EntryKind as EntryKind
+    from robolink.model._journal_entries import NewCheck as NewCheck
     from robolink.model._journal_entries import NewEntry as NewEntry
     from robolink.model._journal_entries import Recorded as Recorded
+    from robolink.model._journal_entries import RecordedCheck as RecordedCheck
     from robolink.model._journal_entries import Signature as Signature
     from robolink.model._journal_entries import answer_entry as answer_entry
     from robolink.model._journal_entries import answered_by_in_words as answered_by_in_words
@@ -154,8 +156,8 @@ else:
             ),
             "_identity": "ControllerFacts Identity Secret Who is_own_name",
             "_journal_entries": (
-                "AnsweredBy EntryKind NO_HISTORY NewEntry PROOFS Recorded "
-                "Signature answer_entry answered_by_in_words finding_named_now "
+                "AnsweredBy EntryKind NO_HISTORY NewCheck NewEntry PROOFS Recorded "
+                "RecordedCheck Signature answer_entry answered_by_in_words finding_named_now "
                 "method_name_now with_method_name_now"
             ),
             "_json_values": "from_fields json_fields json_value",

@@ -37,10 +37,12 @@ class EntryKind(StrEnum):
     IDENTITY = "identity"
     BACKUP = "backup"
     CHECK = "check"
+    CHECK_DAY = "check day"
     ACCURACY = "accuracy"
     ORDER = "order"
     RUN = "run"
     PANEL = "panel"
+    JOURNAL = "journal"
 
 
 PROOFS: Final = (
@@ -56,8 +58,10 @@ NO_HISTORY: Final = (
     EntryKind.RECONNECT,
     EntryKind.LEASE,
     EntryKind.CHECK,
+    EntryKind.CHECK_DAY,
     EntryKind.RUN,
     EntryKind.PANEL,
+    EntryKind.JOURNAL,
 )
 """Kinds of entries about a controller that do not record a change."""
 
@@ -76,7 +80,7 @@ class NewEntry:
         details: Plain JSON values.
     """
 
-    json_version: ClassVar[int] = 3
+    json_version: ClassVar[int] = 5
     kind: EntryKind
     change: str = ""
     operation: str = ""
@@ -135,7 +139,7 @@ class Recorded:
         hash: SHA-256 of all other fields.
     """
 
-    json_version: ClassVar[int] = 3
+    json_version: ClassVar[int] = 5
     number: int
     at: str
     controller: str
@@ -148,6 +152,52 @@ class Recorded:
     details: Mapping[str, object] = field(hash=False)
     signature: Signature
     previous: str
+    hash: str
+
+
+@dataclass(frozen=True, slots=True)
+class NewCheck:
+    """One check of a cell, to be recorded outside the chain of entries.
+
+    Attributes:
+        controller: Identity of the controller; its address where nobody told it.
+        cell: Name of the cell; empty for a URL.
+        well: Whether it was checked and nothing was found.
+        verdict: What was found, in words.
+        details: Plain JSON values.
+    """
+
+    controller: str
+    cell: str
+    well: bool
+    verdict: str
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedCheck:
+    """One check on record.
+
+    Attributes:
+        number: Its number, which gives the order; consecutive from 1.
+        at: Wall-clock label, ISO 8601 UTC with milliseconds.
+        controller: Identity of the controller; its address where nobody told it.
+        cell: Name of the cell; empty for a URL.
+        well: Whether it was checked and nothing was found.
+        verdict: What was found, in words.
+        details: Plain JSON values.
+        signature: Who checked it, and with what.
+        hash: SHA-256 of all other fields.
+    """
+
+    number: int
+    at: str
+    controller: str
+    cell: str
+    well: bool
+    verdict: str
+    details: Mapping[str, object] = field(hash=False)
+    signature: Signature
     hash: str
 
 

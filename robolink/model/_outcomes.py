@@ -158,6 +158,18 @@ class OutcomeLog(Protocol):
             ConfigError: The record cannot be read.
         """
 
+    def refuse_holder(self, *, silent: bool) -> None:
+        """Refuse what another process of this computer would be in the way of; waits for nothing.
+
+        Args:
+            silent: Whether a process is meant that has the lease, still runs, and has not
+                responded for so long that the lease may be taken; else one that responds.
+
+        Raises:
+            BusyError: There is such a process; the message names it.
+            ConfigError: The record cannot be read.
+        """
+
     def hold(self, purpose: str) -> AbstractContextManager[None]:
         """Keep the lease for the whole of a block, markers or not.
 
@@ -243,7 +255,7 @@ class Finding:
         entries: What recovering it records.
     """
 
-    json_version: ClassVar[int] = 3
+    json_version: ClassVar[int] = 5
     marker: Marker
     verdict: Verdict
     sentence: str

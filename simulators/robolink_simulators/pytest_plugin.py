@@ -109,6 +109,8 @@ def robolink_state(
         monkeypatch.setenv("ROBOLINK_STATE_DIR", folder)
     if now["ROBOLINK_JOURNAL"] == _OF_THE_DEVELOPER["ROBOLINK_JOURNAL"]:
         monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
+    if os.environ.get("ROBOLINK_PLANT") == _BEFORE.get("ROBOLINK_PLANT"):
+        monkeypatch.setenv("ROBOLINK_PLANT", "")  # what a test records is copied nowhere
     yield Path(folder)
     if "robolink.journal" in sys.modules:
         from robolink.journal import close_files

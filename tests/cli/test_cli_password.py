@@ -3,9 +3,9 @@
 import sys
 
 import pytest
-from robolink_cli.access import password as _password
 
 from robolink import errors
+from robolink.config import passwords as _password
 
 URL = "epson+tcp://192.0.2.1:5000"
 OTHER = "epson+tcp://192.0.2.2:5000"

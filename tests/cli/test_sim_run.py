@@ -350,8 +350,8 @@ def test_in_the_background_they_end_with_the_shell_that_started_them(file, tmp_p
 
 
 def test_the_file_of_the_page_is_right_as_it_stands_there(file, tmp_path):
-    page = (Path(__file__).parents[2] / "docs/simulated-fleet.md").read_text(encoding="utf-8")
-    _, _, rest = page.partition("```toml\n")
+    page = (Path(__file__).parents[2] / "docs/fleet.md").read_text(encoding="utf-8")
+    _, _, rest = page.partition("\n## Many simulated controllers")[2].partition("```toml\n")
     (tmp_path / MAP.name).write_bytes(MAP.read_bytes())
     cells = read_cells(file(rest.partition("```")[0]), sim.commands)
     assert len(cells) == 202

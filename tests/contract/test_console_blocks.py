@@ -92,6 +92,11 @@ NOT_RUN = {
         "tests/contract/journal/_postgresql.py",
         ("postgresql+psycopg://",),
     ),
+    "journal.md 2": Elsewhere(
+        "a server of PostgreSQL is needed",
+        "tests/contract/journal/test_journal_plant_commands.py",
+        ('run("journal", "sync")', '"ROBOLINK_PLANT"'),
+    ),
     "reference/jogging.md 1, 1": Elsewhere(
         "steps are typed one by one",
         "tests/contract/test_typed_answers.py",
@@ -102,7 +107,7 @@ NOT_RUN = {
         "tests/cli/test_check_contract.py",
         ('"check-contract", "--yes", "--write", "--tool", "3", "--driver"',),
     ),
-    "simulated-fleet.md 1, 2": Elsewhere(
+    "fleet.md 1, 2": Elsewhere(
         "it serves until Ctrl-C",
         "tests/cli/test_sim_run.py",
         ('"sim", "run"', "test_all_kinds_are_served_by_one_process"),

@@ -188,6 +188,14 @@ def a_journal(stack: ExitStack) -> dict[str, Any]:
     return {}
 
 
+def a_line_of_cells(stack: ExitStack) -> dict[str, Any]:
+    stack.enter_context(epson())
+    Path("robolink.toml").write_text('[cells.line3-a]\nurl = "epson+sim://documented"\n')
+    given = dict[str, Any]()
+    given["then"] = lambda: (given["check"].cell, given["check"].failure) == ("line3-a", None)
+    return given
+
+
 def four_poses(stack: ExitStack) -> dict[str, Any]:
     tip, given = ToolOffset(12.5, -3.25, -20), dict[str, Any]()
     poses = []
@@ -344,6 +352,7 @@ MAKERS = {
     "reference/sensors.md 1": above_two_beams,
     "reference/sensors.md 2": nothing,
     "reference/cameras.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
+    "accuracy.md 1": a_line_of_cells,
     "camera-and-board.md 1": nothing,
     "custom-kinematics.md 1": nothing,
     "extending.md 1": two_tools,

@@ -31,6 +31,8 @@ def test_a_crash_leaves_its_marker_to_nobody(epson_tcp, robolink_state):
     controller.outcomes.begin(Marker("a", MarkerKind.SET, "TLSet 1", "then"))
     controller.close()
     assert (robolink_state / "journal.db").exists()
+    from robolink.config import named_plant
+    assert named_plant() is None
 """
 
 CUT = """
@@ -95,6 +97,7 @@ def test_served_simulators_have_the_seed_and_leave_nothing_in_the_tester_s_own_f
     own_folder.mkdir()
     (own_folder / "journal.db").write_bytes(b"precious")
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(own_folder / "journal.db"))
+    monkeypatch.setenv("ROBOLINK_PLANT", "postgresql://tester@plant/copies")
     before = contents(own_folder)
     pytester.makepyfile(test_served=SERVED, test_cut=CUT)
     # It runs in its own process: the environment when the plugin was loaded is the tester's.

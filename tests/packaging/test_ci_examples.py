@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_cli.access import password
 from robolink_cli.commands.measure.solve import answer
 from robolink_simulators.control import assist as port
 from robolink_simulators.hosting import replay
 
 from robolink.backup import _file as backup
+from robolink.config import passwords as password
 from robolink.files import named, toml
 from robolink.register_maps import _drafts as drafts
 

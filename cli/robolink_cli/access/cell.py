@@ -10,8 +10,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 if TYPE_CHECKING:
-    from robolink.config import Cell, Expected
-    from robolink.model import Controller
+    from robolink.config import Cell
 
 
 def is_cell_name(given: str) -> bool:
@@ -57,36 +56,23 @@ def with_cell_limits(
     return chosen
 
 
-def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
-    """Refuse to work on another robot than the one in the cell file.
-
-    Raises:
-        ConfigError: The controller has another robot, or does not say which.
-    """
-    if cell.robot is None:
-        return
-    found = controller.facts().robot_models
-    if cell.robot.casefold() not in (model.casefold() for model in found):
-        raise ConfigError(
-            tr(
-                "Cell {cell} needs robot {expected}; at {url} there is {found}.",
-                cell=cell.cell,
-                expected=cell.robot,
-                url=controller.identity,
-                found=", ".join(found) or tr("a robot that does not say its model"),
-            ),
-            remedy=tr(
-                "Check the address; else correct 'robot' in {path}.",
-                path=cell.robot_file,
-            ),
-        )
-
-
 def complete_cell(context: click.Context, parameter: click.Parameter, start: str) -> list[str]:  # noqa: ARG001 - click's form
     """Return the cells whose names begin so, for TAB; reads only the cell files."""
     from robolink.config import cell_names
 
     return [name for name in cell_names() if name.startswith(start)]
+
+
+def complete_cells(
+    context: click.Context,  # noqa: ARG001 - click's form
+    parameter: click.Parameter,  # noqa: ARG001 - click's form
+    start: str,
+) -> list[str]:
+    """Return cells and groups whose names begin so, for TAB, where several cells are taken."""
+    from robolink.config import GROUP_MARK, cell_names, group_names
+
+    names = [*cell_names(), *(f"{GROUP_MARK}{name}" for name in group_names())]
+    return [name for name in names if name.startswith(start)]
 
 
 def only_cell() -> str:

@@ -8,7 +8,15 @@ from typing import Final
 import click
 
 from robolink.messages import declared
-from robolink_cli.command_map import COMPANIONS, COMPUTER, CONTROLLER, MEASURE, SHIPPED, SIMULATE
+from robolink_cli.command_map import (
+    COMPANIONS,
+    COMPUTER,
+    CONTROLLER,
+    FLEET,
+    MEASURE,
+    SHIPPED,
+    SIMULATE,
+)
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import shared_options
 
@@ -49,6 +57,10 @@ _CELL: Final = {
     "check": (
         f"{COMPUTER}.cell_check:check",
         declared("Nightly check: unexpected changes, overdue checks. Moves nothing."),
+    ),
+    "fleet": (
+        f"{FLEET}.command:fleet",
+        declared("Plans for many cells: plan status halt resume permit"),
     ),
     "files": (f"{COMPUTER}.config:path", declared("Show which cell files robolink reads.")),
     "validate": (f"{COMPUTER}.config:check", declared("Check the cell files.")),

@@ -97,6 +97,7 @@ def _now_called(word: str) -> list[str]:
 DONE: Final = 0
 DIFFERENT: Final = 1
 USAGE: Final = 2
+REFUSED: Final = 5
 UNKNOWN: Final = 6
 BUG: Final = 70
 HUNG_UP: Final = 129
@@ -117,11 +118,15 @@ MEANINGS: Final[dict[int, str]] = {
     DIFFERENT: (
         "`tool compare` found a difference; `journal verify` or `journal report` "
         "found a damaged record; `journal drift` found something unusual; "
+        "`journal move` with `--dry-run` found something in the way; "
         "`check-contract` found a failed check; `cell doctor`, `cell ports` or `cell check` "
         "found something that needs attention"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
-    3: "the controller was not reached, or the link broke",
+    3: (
+        "the controller was not reached, or the link broke; `journal sync` or `journal verify` did "
+        "not reach the plant's database"
+    ),
     4: "protocol error",
     5: "the controller, or a check of its state, said no",
     UNKNOWN: (
@@ -177,8 +182,13 @@ def exit_code(error: BaseException) -> int:
     if isinstance(error, click.ClickException):
         return USAGE
     if isinstance(error, errors.RobolinkError):
-        return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), BUG)
+        return exit_code_of(type(error))
     return BUG if _plug_in(error) is None else USAGE
+
+
+def exit_code_of(kind: type[errors.RobolinkError]) -> int:
+    """Return the exit code of an error of a class, where nothing on the controller is open."""
+    return next((code for known, code in EXIT_CODES if issubclass(kind, known)), BUG)
 
 
 def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) -> int:

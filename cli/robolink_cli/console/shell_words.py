@@ -19,6 +19,7 @@ SHELL_WAYS: Final = {
     RemedyWord.COLUMNS: "--columns",
     RemedyWord.DIALOGUE_FILE: "--record or --transcript",
     RemedyWord.EARLIER_VALUE: "--to NUMBER",
+    RemedyWord.END_HOLDER: "robolink recover --take-over REASON",
     RemedyWord.EULER: "--euler",
     RemedyWord.EXPORT_JOURNAL: "'robolink journal export --read-only'",
     RemedyWord.FORGET_MARKER: "'robolink recover --forget'",

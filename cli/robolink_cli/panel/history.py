@@ -47,8 +47,9 @@ def changes_of(url: str) -> tuple[ChangeRow, ...]:
     Raises:
         JournalError: The journal cannot be read.
     """
-    journal = journal_there()
-    return () if journal is None else tuple(_rows(journal, parse_url(url).address))
+    address = parse_url(url).address
+    journal = journal_there(address)
+    return () if journal is None else tuple(_rows(journal, address))
 
 
 def charts_of(url: str, *, striking: bool = False) -> tuple[ChartCard, ...]:
@@ -61,10 +62,11 @@ def charts_of(url: str, *, striking: bool = False) -> tuple[ChartCard, ...]:
     Raises:
         JournalError: The journal cannot be read.
     """
-    journal = journal_there()
+    address = parse_url(url).address
+    journal = journal_there(address)
     if journal is None:
         return ()
-    cell = cell_drift(journal, parse_url(url).address)
+    cell = cell_drift(journal, address)
     cards = [_card(cell, chart) for chart in cell.charts]
     return tuple(card for card in cards if card.unusual or not striking)
 
@@ -80,8 +82,8 @@ def page_of(url: str, change: str) -> str:
         ConfigError: This controller has no such change, or its entries cannot be understood.
         JournalError: The journal cannot be read.
     """
-    journal = open_journal(read_only=True)
     address = parse_url(url).address
+    journal = open_journal(address=address, read_only=True)
     entries = [*journal.entries(controller=address, change=change, newest_first=False)]
     if not entries:
         raise ConfigError(

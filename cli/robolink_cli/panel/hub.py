@@ -27,6 +27,7 @@ from robolink_cli.panel.recipes import recipes_of
 from robolink_cli.panel.record import standing_of
 from robolink_cli.panel.watch import AT_ONCE
 from robolink_cli.panel.words import speaking_in
+from robolink_cli.session.plant_outbox import PLANT_S, copy_journals_in_use
 
 BEAT_S: Final = 0.25
 """Longest time in s without a frame to a tablet."""
@@ -127,11 +128,20 @@ class Hub:
         """Look at cells, and tell jobs whether their tablet is heard, until cancelled."""
         for board in self.boards.values():
             self.spawn(self.read_standing(board))
+        copies = asyncio.ensure_future(self._copy_to_the_plant())
+        try:
+            while True:
+                now_s = time.monotonic()
+                for board in self.boards.values():
+                    self._tend(board, now_s)
+                await asyncio.sleep(ALIVE_S)
+        finally:
+            copies.cancel()
+
+    async def _copy_to_the_plant(self) -> None:
         while True:
-            now_s = time.monotonic()
-            for board in self.boards.values():
-                self._tend(board, now_s)
-            await asyncio.sleep(ALIVE_S)
+            await asyncio.to_thread(copy_journals_in_use)
+            await asyncio.sleep(PLANT_S)
 
     def _tend(self, board: Board, now_s: float) -> None:
         job = board.job

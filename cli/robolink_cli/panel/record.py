@@ -113,9 +113,9 @@ def standing_of(url: str, before: Standing | None = None) -> Standing:
     """
     found = Standing()
     with suppress(RobolinkError, OSError):
-        journal = journal_there()
+        address = parse_url(url).address
+        journal = journal_there(address)
         if journal is not None:
-            address = parse_url(url).address
             found = _past_of(journal, address, before or found)
             met = journal.names_of(address)[:1]
             found = replace(
@@ -128,13 +128,17 @@ def standing_of(url: str, before: Standing | None = None) -> Standing:
     return found
 
 
-def journal_there() -> Journal | None:
-    """Return the journal, ``None`` where there is none yet.
+def journal_there(address: str) -> Journal | None:
+    """Return the journal of a controller, ``None`` where there is none yet.
+
+    Args:
+        address: How it is reached.
 
     Raises:
         JournalError: It cannot be read.
     """
-    return open_journal(read_only=True) if may_exist(default_location()) else None
+    there = may_exist(default_location(address))
+    return open_journal(address=address, read_only=True) if there else None
 
 
 def cell_drift(journal: Journal, address: str) -> CellDrift:

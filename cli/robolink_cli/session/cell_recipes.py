@@ -138,7 +138,8 @@ def _pasts(loaded: "list[LoadedRecipe]", url: str | None) -> "tuple[RecipePast, 
     from robolink.recipe import RecipePast, pasts_of
 
     try:
-        return pasts_of(loaded, open_journal(read_only=True), address_of(url))
+        address = address_of(url)
+        return pasts_of(loaded, open_journal(address=address, read_only=True), address)
     except (RobolinkError, OSError):
         return (RecipePast(),) * len(loaded)  # a list of jobs needs no record
 

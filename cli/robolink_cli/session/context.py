@@ -195,6 +195,12 @@ def context_of_cell(name: str, *, anew: bool = False) -> CliContext:
     return _context_from({**given, "url": name})
 
 
+def context_with(cell: "Cell") -> CliContext:
+    """Return a command's context for a cell whose files were read already."""
+    given = click.get_current_context().meta.get(GIVEN, {})
+    return CliContext(**{**link_options(cell), **given, "url": cell.url, "cell": cell})
+
+
 def _with_only_cell(options: Mapping[str, object]) -> Mapping[str, Any]:
     """Return the common options, with the only cell if none is named.
 
@@ -219,9 +225,10 @@ def _context_from(given: Mapping[str, Any]) -> CliContext:
     name = given.get("url")
     if name is None or not is_cell_name(name):
         return CliContext(**given)
-    from robolink.config import find_cell
+    from robolink.config import find_cell, use_journals_of
 
     cell = find_cell(name)
+    use_journals_of([cell], cell.settings.journal or "")
     return CliContext(**{**link_options(cell), **given, "url": cell.url, "cell": cell})
 
 
@@ -234,6 +241,7 @@ def _looking_context_from(given: Mapping[str, Any]) -> CliContext:
     reach = glance_at_cell(name)
     if reach is None:
         return _calming_context_from(given)
+    _use_journal(reach)
     said = {"timeout_s": reach.timeout_s} if reach.timeout_s else {}
     return CliContext(**{**said, **given, "url": reach.url, "reach": reach})
 
@@ -251,8 +259,18 @@ def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
             reach = reach_cell(name)
         except ConfigError:
             raise error from None
+        _use_journal(reach)
         note(reach.doubt or error.what)
         return CliContext(**{**given, "url": reach.url, "doubt": error, "reach": reach})
+
+
+def _use_journal(reach: "Reach") -> None:
+    if reach.journal:
+        from robolink.journal import name_journals
+        from robolink.transport import parse_url
+
+        places = {parse_url(reach.url).address: reach.journal, "": reach.journal}
+        name_journals(places, afresh=True)
 
 
 T = TypeVar("T")

@@ -65,8 +65,13 @@ def _last_seen(controller: "Controller") -> "tuple[ControllerStatus, int] | None
     return None if found is None else (found[0], controller.clock.now_ns() - found[1])
 
 
-def remember_address(context: "CliContext") -> None:
-    """Store how the cell was reached, for a stop when its file cannot be read."""
+def remember_address(context: "CliContext", proof: str | None = None) -> None:
+    """Store how the cell was reached, for a stop when its file cannot be read.
+
+    Args:
+        context: What the command was told.
+        proof: Of the cell files, where it is known already.
+    """
     if context.cell is None or "+sim://" in context.cell.url:
         return
     from robolink.config import Reach, proof_of_files, remember_reach
@@ -80,7 +85,8 @@ def remember_address(context: "CliContext") -> None:
             password_file=settings.password_file or "",
             password_env=settings.password_env or "",
             timeout_s=settings.timeout_s or 0.0,
-            proof=proof_of_files(),
+            journal=settings.journal or "",
+            proof=proof_of_files() if proof is None else proof,
             expected=context.cell.expected,
         ),
     )

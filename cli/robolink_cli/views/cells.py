@@ -16,10 +16,12 @@ from robolink.config import (
 )
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
+from robolink.journal import default_location, named_by_environment, shown_location
 from robolink.messages import tr
 from robolink.methods import AnyMethod, Check, all_methods, parameter_problems
 from robolink.stations import StationKind
 from robolink.timing import local_label
+from robolink.transport import parse_url
 from robolink_cli.access.cell import link_options
 from robolink_cli.console.render import say, table
 from robolink_cli.console.tables import columns, padded
@@ -199,6 +201,10 @@ def cell_payload(cell: Cell, context: CliContext, *, origin: bool) -> dict[str, 
         elif key not in values and key != "password_file":
             values[key] = said.get(key, getattr(defaults, key))
             origins[key] = tr("default")
+    place = default_location(parse_url(cell.url).address)
+    values["journal"] = shown_location(place)
+    variable = named_by_environment()
+    origins["journal"] = variable or origins.get("journal", tr("default"))
     payload: dict[str, Any] = {"cell": cell.name, "values": values}
     return payload | {"origins": origins} if origin else payload
 

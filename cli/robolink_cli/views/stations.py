@@ -202,8 +202,8 @@ def records_of_robots(
 
     address = parse_url(context.require_url()).address
     robots, entries = tuple[str, ...](), list[Recorded]()
-    if may_exist(default_location()):
-        journal = open_journal(read_only=True)
+    if may_exist(default_location(address)):
+        journal = open_journal(address=address, read_only=True)
         robots = journal.robots_of(address)
         entries = list(journal.entries(controller=address, kinds=kinds))
     if robot is not None:

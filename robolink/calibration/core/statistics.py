@@ -139,6 +139,16 @@ def f_quantile(p: float, d1: float, d2: float) -> float:
 def f_exceeded(f: float, d1: float, d2: float) -> float:
     """Return how likely a value of F with ``d1`` and ``d2`` degrees of freedom is above ``f``.
 
+    Args:
+        f: The value; the square of a t counts with ``d1`` 1.
+        d1: Degrees of freedom of its numerator.
+        d2: Those of its denominator.
+
+    Example:
+        >>> from robolink.calibration import f_exceeded, student_t
+        >>> round(f_exceeded(student_t(0.975, 29) ** 2, 1.0, 29.0), 9)
+        0.05
+
     Raises:
         ValueError: One of them is not positive.
     """

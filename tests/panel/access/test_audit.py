@@ -82,7 +82,7 @@ def test_refusals_of_another_minute_are_written_again(audit):
 def test_a_journal_that_cannot_be_written_holds_nothing_up_and_loses_nothing(audit, monkeypatch):
     from robolink.errors import JournalError
 
-    def broken():
+    def broken(**_):
         raise JournalError("the disk is full")
 
     monkeypatch.setattr(audit_module, "_MOST_WAITING", 100)

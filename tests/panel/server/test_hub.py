@@ -31,7 +31,8 @@ from robolink_cli.wizard.views.records import (
 )
 from starlette.websockets import WebSocketDisconnect
 
-from robolink.model import Marker, MarkerKind
+from robolink.journal import close_files, open_journal
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 from robolink.stopping import StopNote
 from tests.panel.access._bare import Clock
 
@@ -560,3 +561,25 @@ def test_a_cell_that_names_no_tool_finds_no_station():
     board = Hub([cell], FewPages(), NoSeats(), lambda *_, **__: None).boards["line3"]
     assert "station" not in {one.job for one in board.offers(Watcher(role="engineer"))}
     assert board.station(KINDS["station"], {"station": "PIN-07"}) is None
+
+
+def test_while_it_runs_the_journal_is_copied_to_the_plant(hub, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    open_journal().log("cell-a").append(NewEntry(EntryKind.DECISION))
+
+    async def work():
+        asked = asyncio.Event()
+
+        async def answer(_, writer):
+            asked.set()
+            writer.close()
+
+        async with await asyncio.start_server(answer, "127.0.0.1", 0) as plant:
+            port = plant.sockets[0].getsockname()[1]
+            monkeypatch.setenv("ROBOLINK_PLANT", f"postgresql://u@127.0.0.1:{port}/plant")
+            running = asyncio.ensure_future(hub.run())
+            await asyncio.wait_for(asked.wait(), 10)
+            running.cancel()
+
+    asyncio.run(work())
+    close_files()

@@ -81,6 +81,9 @@ LEFT_OUT: Final[Mapping[str, str]] = {
     "cell scan": "it looks for controllers on a network",
     "cell ports": "it looks at the ports of this computer",
     "cell people": "it reads files of this computer alone",
+    "cell fleet": "it is about the plans of a plant; tests/fleet kills its agent",
+    "journal move": "it moves the record that the rules read; its tests kill it at each step",
+    "journal sync": "it copies to a plant, of which these cells know none",
     "expert serve": "it serves until it is ended; cells whose program calls back have it",
     "expert spel run": "it brings a controller of its own",
 }

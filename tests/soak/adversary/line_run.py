@@ -25,7 +25,7 @@ from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.people import Tell
 from tests.soak.adversary.plant.machine import PlantMachine
 
-_PASSWORDS: Final = "robolink_cli.access.password"
+_PASSWORDS: Final = "robolink.config.passwords"
 
 
 def run_line(

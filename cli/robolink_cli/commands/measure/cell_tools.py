@@ -81,9 +81,9 @@ def _changes_left(context: CliContext) -> dict[int, int]:
     from robolink_cli.session.completion import address_of
 
     address, name = address_of(context.url), context.cell.name if context.cell else ""
-    if not (address and may_exist(default_location())):
+    if not (address and may_exist(default_location(address))):
         return {}
-    journal = open_journal(read_only=True)
+    journal = open_journal(address=address, read_only=True)
     left: dict[int, int] = {}
     for path in recipes_at(context.cell):
         # The command that runs a recipe reports its errors.

@@ -170,7 +170,8 @@ class Audit:
         cell, who = _signed(entries[0])
         url = self._urls.get(cell, "")
         signature = replace(signature_here(__version__), operator=who)
-        log = open_journal().log(parse_url(url).address if url else PANEL, signature=signature)
+        address = parse_url(url).address if url else ""
+        log = open_journal(address=address).log(address or PANEL, signature=signature)
         log.append(
             *(
                 NewEntry(

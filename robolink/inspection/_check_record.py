@@ -15,6 +15,7 @@ from robolink.journal import (
     open_journal,
     signature_here,
 )
+from robolink.journal.store.seal import MovedRecordError
 from robolink.model import Controller, NewCheck, Signature
 from robolink.transport import parse_url
 from robolink.version import VERSION
@@ -127,22 +128,30 @@ class Recorder:
         for (memory, kept), group in groups.items():
             try:
                 self._append(memory, kept, group)
-            except JournalError:
-                for one in group:  # perhaps it is only the record of one cell that is elsewhere
+            except MovedRecordError:
+                for one in group:  # only the records of some cells are elsewhere
                     try:
                         self._append(memory, kept, [one])
                     except JournalError as error:
-                        if one.check.failure is None:
-                            failed = replace(one.check, failure=CheckFailure.of(error))
-                            self._done[one.place.number] = failed
+                        self._fail([one], error)
+            except JournalError as error:  # nor would one alone be stored; perhaps all of them were
+                self._fail(group, error)
+
+    def _fail(self, group: Sequence[EndedCheck], error: JournalError) -> None:
+        for one in group:
+            if one.check.failure is None:
+                failed = replace(one.check, failure=CheckFailure.of(error))
+                self._done[one.place.number] = failed
 
     def _append(self, memory: str, kept: str, group: Sequence[EndedCheck]) -> None:
         journal = memory_journal(memory) if memory else open_journal(kept)
-        journal.record_checks(
-            [self._record(journal, one) for one in group],
-            signature=self._signature,
-            keep_days=self._keep_days,
-        )
+        records = [self._record(journal, one) for one in group]
+        try:
+            journal.record_checks(records, signature=self._signature, keep_days=self._keep_days)
+        except MovedRecordError as error:
+            if len(records) > 1:
+                raise
+            raise error.about([records[0].controller]) from error
 
     def _record(self, journal: Journal, ended: EndedCheck) -> NewCheck:
         controller = ended.met.name if ended.met else journal.names_of(ended.place.address)[0]

@@ -38,7 +38,10 @@ class CheckFailure:
     def of(cls, error: RobolinkError) -> "CheckFailure":
         """Return what an error says."""
         busy = isinstance(error, BusyError)
-        return cls(type(error).__name__, error.what, error.remedy, busy)
+        kind = next(
+            one for one in type(error).__mro__ if one.__module__ == RobolinkError.__module__
+        )
+        return cls(kind.__name__, error.what, error.remedy, busy)
 
 
 @dataclass(frozen=True, slots=True)

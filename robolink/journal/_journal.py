@@ -9,7 +9,6 @@ from robolink.errors import JournalError
 from robolink.journal._lease_view import FREE, LeaseHolder, LeaseView
 from robolink.journal._outcome_log import JournalOutcomeLog
 from robolink.journal.store.chain import ChainCheck
-from robolink.journal.store.check_rows import ClosedDay, problems_of_days
 from robolink.journal.store.entry_rows import ChainVerification, Filter
 from robolink.journal.store.migrations import unknown_fields_error
 from robolink.messages import tr
@@ -273,17 +272,7 @@ class Journal:
         """Compare the checks on record with what the chain says of their days, at one instant."""
         with self._store.read() as tables:
             tables.connection.run(tables.connection.begin_snapshot)
-            kinds = Filter(kinds=(EntryKind.CHECK_DAY,), newest_first=False)
-            days: list[ClosedDay] = []
-            after = 0
-            while True:
-                page = tables.entries.page(kinds, before=None, after=after, limit=PAGE)
-                days += filter(None, (ClosedDay.of(_details(row["details"])) for row in page))
-                if len(page) < PAGE:
-                    break
-                after = page[-1]["number"]
-            last = tables.checks.last_number()
-            return list(problems_of_days(days, tables.checks.between(1, last), last))
+            return list(tables.checks.problems())
 
     def outbox(self, plant: str) -> "JournalOutbox":
         """Return what copies this journal to a plant's database, and compares the two.

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.files.durable import file_name, make_folder, state_folder, write_whole
+from robolink.journal._places import without_user
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
 from robolink.timing import wall_label
@@ -68,7 +69,7 @@ def leave_trace(identity: str, journal: str, newest: tuple[int, str] | None) -> 
     """
     path = _path(identity)
     before = _noted(identity)
-    if before is not None and before.journal == journal:
+    if before is not None and without_user(before.journal) == without_user(journal):
         return
     known = {
         "schema": _SCHEMA,
@@ -94,7 +95,7 @@ def carry_traces(
     """
     for identity in identities:
         noted = _noted(identity)
-        if noted is not None and noted.journal == before:
+        if noted is not None and without_user(noted.journal) == without_user(before):
             with suppress(OSError):  # a record that was moved is found to go on all the same
                 leave_trace(identity, journal, newest)
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING
 from robolink.errors import JournalError, LeaseHeldError, OutcomeUnknownError, RobolinkError
 from robolink.journal._journal_loss import carry_traces
 from robolink.journal._lease_view import FREE, LeaseView, describe_holder, this_process
-from robolink.journal._places import JournalPlace, default_location, place_of
+from robolink.journal._places import JournalPlace, default_location, place_of, without_user
 from robolink.journal.store import statements
 from robolink.journal.store.chain import storable
+from robolink.journal.store.check_rows import OF_CHECKS
 from robolink.journal.store.migrations import EmptyJournalError, newer_error
 from robolink.journal.store.seal import (
     WHOLE,
@@ -253,7 +254,7 @@ def _completed(
         JournalError: The record was moved to another place, or is not there.
     """
     _require_arrived(move, origin, goal)
-    with closing(Store(goal, read_only=False)) as store, store.read() as tables:
+    with closing(Store(goal, read_only=False, left=origin)) as store, store.read() as tables:
         number, last_hash = newest = tables.entries.head() or (0, "")
         count = tables.entries.count()
         controllers = _controllers(tables, ())
@@ -270,7 +271,8 @@ def _completed(
 
 
 def _require_arrived(move: Moved, origin: JournalPlace, goal: JournalPlace) -> None:
-    if move.state is not MoveState.MOVED or move.place != goal.location:
+    there = without_user(move.place) == without_user(goal.location)
+    if move.state is not MoveState.MOVED or not there:
         raise moved_error(move, origin.name)
     held = goal.path is None or goal.path.exists()
     if held:
@@ -314,7 +316,7 @@ def _places(source: str | None, target: str) -> tuple[JournalPlace, JournalPlace
             tr("There is no journal {name}.", name=origin.name),
             remedy=tr("Nothing was moved. Name the journal in ROBOLINK_JOURNAL."),
         )
-    same = origin.location == goal.location or (
+    same = without_user(origin.location) == without_user(goal.location) or (
         origin.path is not None
         and goal.path is not None
         and goal.path.exists()
@@ -338,7 +340,10 @@ def _names(tables: "Tables", controller: str | None) -> tuple[str, ...]:
 def _meant(tables: "Tables", names: tuple[str, ...]) -> tuple[tuple[str, ...], ChainCensus]:
     """Return what is moved: of a controller that is alone in its journal the journal as it is."""
     found = census(tables.entries, names)
-    return (names if found.others else ()) if found.count else names, found
+    checked = {tables.names.owner(name) for name in tables.checks.controllers()}
+    if names and found.count and not found.others and checked <= {*names}:
+        return (), census(tables.entries, ())  # its days of checks come along
+    return names, found
 
 
 def _controllers(tables: "Tables", names: Sequence[str]) -> tuple[str, ...]:
@@ -346,7 +351,7 @@ def _controllers(tables: "Tables", names: Sequence[str]) -> tuple[str, ...]:
     if names:
         return (names[0],)
     rows = tables.connection.rows(statements.CONTROLLERS)
-    return tuple(sorted({tables.names.owner(name) for (name,) in rows}))
+    return tuple(sorted({tables.names.owner(name) for (name,) in rows if name != OF_CHECKS}))
 
 
 def _hindrances(
@@ -454,7 +459,8 @@ def _require_free(tables: "Tables", origin: JournalPlace, goal: JournalPlace) ->
         JournalError: It is one.
     """
     move = tables.moved(())
-    if move is not None and (move.state, move.place) == (MoveState.ARRIVING, origin.location):
+    arrives_from = move.place if move is not None and move.state is MoveState.ARRIVING else ""
+    if without_user(arrives_from) == without_user(origin.location):
         return
     holds = tables.entries.count() or any(
         tables.connection.table(name) for name in ("markers", "addresses", "leases")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
+from robolink.journal._places import without_user
 from robolink.journal._plant import ChainConflictError, ChainEnd, PlantDatabase
 from robolink.journal.store.chain import FIRST, ChainCheck
 from robolink.journal.store.entry_rows import Filter
@@ -110,6 +111,9 @@ class JournalOutbox:
     def copy(self, *, within_s: float | None = None, new_chain: bool = False) -> ChainCopy:
         """Copy the entries that the plant lacks; where it lacks none, nothing is written.
 
+        A journal that lies elsewhere than before, or was put back in the place of the one that
+        replaced it, is noted there too, also without a new entry.
+
         Args:
             within_s: After so long no further batch of :data:`BATCH` entries is begun.
             new_chain: Whether this journal may take the place of another one that was copied from
@@ -131,7 +135,8 @@ class JournalOutbox:
             if end is None:
                 continue  # another process has begun a chain, or added to this one
             rows = self._behind(end)
-            if not rows or (deadline is not None and deadline.expired):
+            settled = (end.home, end.replaced_by) == (self._home, "")
+            if (settled and not rows) or (deadline is not None and deadline.expired):
                 lacking = self._last_number() - end.number
                 return ChainCopy(chain, copied, end.number, end.hash, lacking)
             end = self._database.add(end, rows, self._home)
@@ -270,7 +275,7 @@ def home_of(location: str) -> str:
         location: The journal's URL without its password; that of a server names its computer.
     """
     path = location.removeprefix("sqlite:///")
-    return location if path == location else f"{platform.node()}:{path}"
+    return without_user(location) if path == location else f"{platform.node()}:{path}"
 
 
 def _conflict(what: str, end: ChainEnd) -> ChainConflictError:

@@ -106,6 +106,11 @@ def shown_location(location: str) -> str:
     return f"{scheme}://{_without_password(rest)}"
 
 
+def without_user(location: str) -> str:
+    """Return a journal's location as all who use it have it: its owner and the cells' role."""
+    return re.sub(r"^(postgresql(?:\+psycopg)?://)[^/?]*@", r"\1", location)
+
+
 def may_exist(location: str) -> bool:
     """Return whether a journal may exist at a place: files are looked for, servers are not."""
     path = place_of(location).path

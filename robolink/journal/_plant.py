@@ -42,8 +42,8 @@ _COLUMNS: Final = ("at", "controller", "kind", "change", "tool", "previous", "ha
 _COPY: Final = f"COPY fleet.cell_entries (chain, number, entry, {', '.join(_COLUMNS)}) FROM STDIN"
 # A role that may delete no entry may still set a head back: so the last entry is read with it.
 _HEADS: Final = """
-    SELECT head.chain, head.number, head.hash, head.home, coalesce(last.number, 0),
-        coalesce(last.hash, '')
+    SELECT head.chain, head.number, head.hash, head.home, head.replaced_by,
+        coalesce(last.number, 0), coalesce(last.hash, '')
     FROM fleet.cell_heads AS head LEFT JOIN LATERAL (
         SELECT number, hash FROM fleet.cell_entries AS entry WHERE entry.chain = head.chain
         ORDER BY number DESC LIMIT 1
@@ -51,8 +51,8 @@ _HEADS: Final = """
 """
 _OF_CHAIN: Final = f"{_HEADS} WHERE head.chain = %(chain)s"
 _AT_HOME: Final = (
-    f"{_HEADS} WHERE head.home = %(home)s AND head.number > 0 AND head.replaced_by = '' "
-    "ORDER BY head.copied_at DESC LIMIT 1"
+    f"{_HEADS} WHERE head.home = %(home)s AND (head.number > 0 OR last.number > 0) "
+    "AND head.replaced_by = '' ORDER BY head.copied_at DESC LIMIT 1"
 )
 # By a statement of its own: what is read with the head afterwards is then as the lock found it.
 _LOCK: Final = "SELECT number FROM fleet.cell_heads WHERE chain = %(chain)s FOR UPDATE"
@@ -65,7 +65,7 @@ _BEGIN: Final = """
 _REPLACE: Final = "UPDATE fleet.cell_heads SET replaced_by = %(chain)s WHERE chain = %(before)s"
 _MOVE_HEAD: Final = """
     UPDATE fleet.cell_heads SET number = %(number)s, hash = %(hash)s, home = %(home)s,
-        copied_at = now() WHERE chain = %(chain)s
+        replaced_by = %(replaced_by)s, copied_at = now() WHERE chain = %(chain)s
 """
 
 _SETTINGS: Final = {
@@ -102,12 +102,14 @@ class ChainEnd:
         number: Number of that last entry, 0 before the first.
         hash: Its hash, empty before the first.
         home: Where the journal lies from which it was copied.
+        replaced_by: The chain that a person let take its place, empty for none.
     """
 
     chain: str
     number: int
     hash: str
     home: str
+    replaced_by: str = ""
 
 
 class PlantDatabase:
@@ -202,11 +204,12 @@ class PlantDatabase:
             return True
 
     def add(self, end: ChainEnd, rows: Sequence[Mapping[str, Any]], home: str) -> ChainEnd | None:
-        """Add the next entries of a chain, in one transaction.
+        """Add the next entries of a chain, in one transaction; it is the one at its home then.
 
         Args:
             end: Behind which entry.
-            rows: The entries as their journal stores them, without a gap.
+            rows: The entries as their journal stores them, without a gap; none where only its
+                home has changed, or it was put back.
             home: Where that journal lies.
 
         Returns:
@@ -224,7 +227,10 @@ class PlantDatabase:
                 for row in rows:
                     fields = [row[name] for name in _COLUMNS]
                     copy.write_row((end.chain, row["number"], hashed_text(row), *fields))
-            last = ChainEnd(end.chain, rows[-1]["number"], rows[-1]["hash"], home)
+            number, last_hash = end.number, end.hash
+            if rows:
+                number, last_hash = rows[-1]["number"], rows[-1]["hash"]
+            last = ChainEnd(end.chain, number, last_hash, home)
             driver.execute(_MOVE_HEAD, asdict(last))
             return last
 

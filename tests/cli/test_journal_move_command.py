@@ -5,8 +5,9 @@ import json
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.computer.checkup import Level, check_journal
+from robolink_cli.commands.record.journal_move import _show_end
 
-from robolink.journal import name_journals, open_journal
+from robolink.journal import JournalMove, name_journals, open_journal
 from robolink.journal._connections import _closed, _opened, close_files
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 
@@ -47,7 +48,7 @@ def test_a_cell_goes_on_with_the_journal_that_was_moved(
     whole, new = json.loads(out), tmp_path / "new.db"
     code, out, _ = plain("journal", "move", str(new), "--dry-run")
     assert (code, new.exists()) == (0, False)
-    assert f"{whole['entry_count']} entries would be moved" in out
+    assert f"entries that would be moved: {whole['entry_count']}" in out
     assert "epson:" in out
     code, out, _ = plain("--json", "journal", "move", str(new))
     said = json.loads(out)
@@ -113,6 +114,19 @@ def test_one_controller_is_moved_out_of_a_journal_and_the_others_stay(
     assert run("undo", "--yes")[0] == 0
 
 
+def test_a_cell_that_the_environment_names_is_not_moved_alone(
+    run, plain, changed, simulator, monkeypatch, tmp_path
+):
+    open_journal().log("line3").append(NewEntry(EntryKind.DECISION, verdict="comes along"))
+    monkeypatch.setenv("ROBOLINK_CONTROLLER", simulator.url)
+    new = str(tmp_path / "new.db")
+    said = json.loads(run("--json", "journal", "move", new, "--dry-run")[1])
+    assert said["controller"].startswith("epson:")
+    code, out, _ = plain("--json", "journal", "move", new)
+    said = json.loads(out)
+    assert (code, said["controller"], len(said["controllers"])) == (0, None, 2)
+
+
 def test_a_place_that_is_taken_is_refused(plain, changed, tmp_path):
     taken = str(tmp_path / "taken.db")
     open_journal(taken).log("x").append(NewEntry(EntryKind.RAW))
@@ -143,3 +157,12 @@ def test_the_line_of_a_cell_file_that_names_the_old_journal_is_named(
         assert plain("-c", "line3", "tool", "set", "1", "--x", "14", "--yes")[0] == 0
     finally:
         name_journals({}, afresh=True)
+
+
+def test_the_password_of_the_old_place_is_not_printed(capsys, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_JOURNAL", "postgresql://cells:geheim9@db.plant/journal")
+    place = "postgresql+psycopg://cells:***@db.plant/journal"
+    _show_end(JournalMove(place, "sqlite:////new.db", "", ("cell-a",), 1, 1, "ab"))
+    out = " ".join(capsys.readouterr().out.split())
+    assert "still names the old one: postgresql://cells:***@db.plant/journal" in out
+    assert "geheim9" not in out

@@ -16,13 +16,14 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 import robolink
 from robolink.backup import read_tools
 from robolink.config import add_cell, find_cell
-from robolink.errors import ConfigError
-from robolink.inspection import CellCheck, CheckState, check_cell, check_cells
-from robolink.journal import LeaseHolder, open_journal
+from robolink.errors import BusyError, ConfigError
+from robolink.inspection import CellCheck, CheckFailure, CheckState, check_cell, check_cells
+from robolink.journal import ChainConflictError, Journal, LeaseHolder, move_journal, open_journal
 from robolink.journal._lease_view import this_process
-from robolink.model import Signature, ToolOffset
+from robolink.model import EntryKind, NewEntry, Signature, ToolOffset
 from robolink.stopping import StopListener, holders_of
 from robolink.transport import far_end_of
+from tests.contract.journal._acts import run
 from tests.faults._requests import changes
 
 WELL, BUSY, FAILED = CheckState.WELL, CheckState.BUSY, CheckState.FAILED
@@ -256,3 +257,40 @@ def test_a_check_is_compared_by_its_result_and_not_by_its_time(line):
     assert isinstance(check, CellCheck)
     assert check == replace(check, seconds=99.0)
     assert check.well
+
+
+def test_a_journal_that_takes_no_checks_is_asked_once_for_all_of_them(line, monkeypatch):
+    """A second attempt would wait for each cell, or store what was stored once more."""
+    check_cells(cells(line))
+    asked, record = [], Journal.record_checks
+
+    def recorded(journal, checks, **terms):
+        asked.append(len(checks))
+        record(journal, checks, **terms)
+
+    monkeypatch.setattr(Journal, "record_checks", recorded)
+    run(open_journal(), "DELETE FROM check_head")
+    checks = check_cells(cells(line))
+    assert (asked, [why(check).kind for check in checks]) == ([4], ["JournalError"] * 4)
+
+
+def test_a_cell_whose_record_was_moved_keeps_no_other_from_being_recorded(line, tmp_path):
+    check_cells(cells(line))
+    for one in on_record().values():
+        open_journal().log(one.controller).append(NewEntry(EntryKind.DECISION))
+    own = {name: str(tmp_path / f"{name}.db") for name in ("press-1", "press-3")}
+    for name, place in own.items():
+        move_journal(place, controller=on_record()[name].controller)
+    checks = check_cells(cells(line))
+    assert states(checks) == {**dict.fromkeys(line, WELL), **dict.fromkeys(own, FAILED)}
+    for check in checks[0], checks[2]:
+        assert (why(check).kind, own[check.cell] in why(check).what) == ("JournalError", True)
+    assert len(list(open_journal().checks())) == 4 + 2
+
+
+def test_the_kind_of_a_failure_is_an_error_that_everybody_can_name():
+    error = ChainConflictError("It is another one.", plant_end=(1, "ab"))
+    assert CheckFailure.of(error).kind == "JournalError"
+    assert CheckFailure.of(BusyError("It is at work.")) == CheckFailure(
+        "BusyError", "It is at work.", busy=True
+    )

@@ -8,7 +8,8 @@ import pytest
 
 from robolink.errors import JournalError
 from robolink.journal import _places, default_location
-from robolink.journal._places import place_of
+from robolink.journal._outbox import home_of
+from robolink.journal._places import place_of, without_user
 from robolink.journal.store.connection import parameters_of
 
 # The place of a journal: named by a variable, a path or a URL, and shown without passwords.
@@ -184,3 +185,19 @@ def test_blanks_in_the_name_of_a_mount_are_understood(point, folder):
 )
 def test_on_windows_the_path_or_its_drive_tells(path, kind, found):
     assert _places.share_of_windows(path, lambda _: kind) == found
+
+
+@pytest.mark.parametrize(
+    ("location", "shared"),
+    [
+        ("postgresql+psycopg://owner@h:5/d?options=a@b", "postgresql+psycopg://h:5/d?options=a@b"),
+        ("postgresql://cells:***@h/d", "postgresql://h/d"),
+        ("postgresql+psycopg://h/d", "postgresql+psycopg://h/d"),
+        ("sqlite:////a/b@c/d.db", "sqlite:////a/b@c/d.db"),
+        ("/a://b@c/d.db", "/a://b@c/d.db"),
+        ("", ""),
+    ],
+)
+def test_a_journal_on_a_server_is_the_same_one_for_each_of_its_users(location, shared):
+    assert without_user(location) == shared
+    assert location.startswith(("/", "sqlite")) or home_of(location) == shared

@@ -6,20 +6,24 @@ check with another date is recorded, the day before is closed: the numbers of it
 check, how many there were and how many found nothing, and one hash over all of them become an
 entry of the chain. From then on ``verify`` finds a check that was changed or is missing. The same
 entry says from which number on checks are kept, so that deleting older days touches no entry.
+Both are taken from the newest such entry, which nobody can change unseen: a note beside it could
+be set forward, and would hide what was deleted, or keep a day from ever being closed.
 
 The numbers give the order; the date is only a label.
 """
 
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import date, timedelta
 from hashlib import sha256
+from itertools import pairwise
 from typing import Any, Final
 
 from robolink.journal.store import statements
 from robolink.journal.store.chain import canonical, digest, storable
 from robolink.journal.store.connection import DatabaseConnection
-from robolink.journal.store.entry_rows import EntryRows
+from robolink.journal.store.entry_rows import DamagedHeadError, EntryRows, Filter
 from robolink.messages import plain, tr
 from robolink.model import EntryKind, NewCheck, NewEntry, Signature
 from robolink.timing import wall_time
@@ -62,11 +66,12 @@ class CheckRows:
         today = now.date()
         # The update comes first: on either database it holds off whoever else records checks.
         self._connection.run(statements.COUNT_CHECKS, {"count": len(checks)})
-        last, closed, kept_from, day = self._head()
+        last, day = self._head()
         before = last - len(checks)
         if day != today.isoformat():
+            closed, kept_from = self._closed()
             if before > closed:
-                kept_from = self._forget(kept_from, closed, today, keep_days)
+                kept_from = self._forget(kept_from, today, keep_days)
                 self._close(signature, day, closed + 1, before, kept_from)
                 closed = before
             values = {"closed": closed, "kept_from": kept_from, "day": today.isoformat()}
@@ -112,35 +117,76 @@ class CheckRows:
         rows = self._connection.rows(listing, values)
         return [dict(zip(statements.CHECK_COLUMNS, row, strict=True)) for row in rows]
 
-    def last_number(self) -> int:
-        """Return the number of the check that was recorded last, 0 for none."""
-        return self._head()[0] if self._known else 0
+    def problems(self) -> Iterator[str]:
+        """Yield what is wrong with the checks on record, one sentence each."""
+        if self._known:
+            try:
+                last, _ = self._head()
+            except DamagedHeadError:
+                last = -1
+            yield from problems_of_days([day for _, day in self.days()], self.between(1), last)
 
-    def between(self, first: int, last: int) -> Iterator[Mapping[str, Any]]:
-        """Yield the checks from one number to another, in their order."""
-        after = first - 1
+    def between(self, first: int, last: int | None = None) -> Iterator[Mapping[str, Any]]:
+        """Yield the checks from one number to another, or to the last, in their order."""
+        after, before = first - 1, None if last is None else last + 1
         while True:
-            page = self.page((), before=last + 1, after=after, limit=_PAGE, newest_first=False)
+            page = self.page((), before=before, after=after, limit=_PAGE, newest_first=False)
             yield from page
             if len(page) < _PAGE:
                 return
             after = page[-1]["number"]
 
-    def _head(self) -> tuple[int, int, int, str]:
-        ((number, closed, kept_from, day),) = self._connection.rows(statements.CHECK_HEAD)
-        return number, closed, kept_from, day
+    def controllers(self) -> tuple[str, ...]:
+        """Return the names of the controllers whose checks are on record."""
+        rows = self._connection.rows(statements.CHECKED_CONTROLLERS) if self._known else []
+        return tuple([name for (name,) in rows])
 
-    def _forget(self, kept_from: int, closed: int, today: date, keep_days: int | None) -> int:
-        """Delete the days that are kept no longer; return the first number that is left."""
+    def _head(self) -> tuple[int, str]:
+        """Return the number of the last check, and which day is not closed yet.
+
+        Raises:
+            DamagedHeadError: The note of that is missing, or there are several.
+        """
+        rows = self._connection.rows(statements.CHECK_HEAD)
+        if len(rows) != 1:
+            raise DamagedHeadError(tr("The note of the last check is missing or was changed."))
+        ((number, day),) = rows
+        return number, day
+
+    def _closed(self) -> tuple[int, int]:
+        """Return the last number of the newest closed day, and from which number on are kept."""
+        newest = next((day for _, day in self.days(newest_first=True)), None)
+        return (newest.last, newest.kept_from) if newest is not None else (0, 1)
+
+    def days(self, *, newest_first: bool = False) -> Iterator[tuple[str, "ClosedDay"]]:
+        """Yield what the chain says of each day of checks, with when that was said."""
+        # By their name, which has an index: most journals have few entries of this kind.
+        wanted = Filter((OF_CHECKS,), kinds=(EntryKind.CHECK_DAY,), newest_first=newest_first)
+        bounds: dict[str, int | None] = {"before": None, "after": None}
+        while page := self._entries.page(wanted, **bounds, limit=_PAGE):
+            for row in page:
+                day = ClosedDay.of(row["details"])
+                if day is not None:
+                    yield row["at"], day
+            bounds["before" if newest_first else "after"] = page[-1]["number"]
+
+    def _forget(self, kept_from: int, today: date, keep_days: int | None) -> int:
+        """Delete the oldest days, closed before those that are kept; return the first number left.
+
+        A day is as old as its entry: the dates of the checks themselves can be changed.
+        """
         if keep_days is None:
             return kept_from
         cutoff = (today - timedelta(days=keep_days)).isoformat()
-        values = {"closed": closed, "cutoff": cutoff}
-        ((last,),) = self._connection.rows(statements.LAST_OLD_CHECK, values)
-        if last is None:
-            return kept_from
+        last = kept_from - 1
+        for closed_at, day in self.days():
+            closed_on = closed_at[: len(cutoff)]
+            if cutoff < closed_on <= today.isoformat():
+                break
+            if closed_on <= cutoff:  # one of the future was closed by a wrong clock: the next tells
+                last = max(last, day.last)
         self._connection.run(statements.FORGET_CHECKS, {"last": last})
-        return int(last) + 1
+        return last + 1
 
     def _close(self, signature: Signature, day: str, first: int, last: int, kept_from: int) -> None:
         total = DayDigest()
@@ -207,14 +253,15 @@ class ClosedDay:
     kept_from: int
 
     @classmethod
-    def of(cls, details: Mapping[str, object]) -> "ClosedDay | None":
+    def of(cls, stored: str) -> "ClosedDay | None":
         """Return what an entry says; ``None`` for a damaged one, which the chain shows itself."""
         try:
+            details = json.loads(stored)
             first, last, checks, kept_from = (
                 int(str(details[key])) for key in ("first", "last", "checks", "kept_from")
             )
             day, total = str(details["day"]), str(details["hash"])
-        except (KeyError, ValueError):
+        except (KeyError, ValueError, TypeError, RecursionError):
             return None
         return cls(day, first, last, checks, total, kept_from)
 
@@ -227,8 +274,11 @@ def problems_of_days(
     Args:
         days: What the chain says, oldest first.
         rows: The checks that are there, in the order of their numbers.
-        last: Number of the check that was recorded last.
+        last: Number of the check that was recorded last, by the note of that; -1 without it.
     """
+    for before, after in pairwise((ClosedDay("", 1, 0, 0, "", 1), *days)):
+        if after.first != before.last + 1:
+            yield tr("The checks of {day} are not those that were recorded.", day=after.day)
     kept_from = days[-1].kept_from if days else 1
     closed = days[-1].last if days else 0
     kept = [(day, DayDigest()) for day in days if day.last >= kept_from]
@@ -247,12 +297,14 @@ def problems_of_days(
             if number > expected:
                 yield _missing(expected, number - 1)
             expected = number + 1
-    if expected <= last:
+    if last < expected - 1:
+        yield tr("The note of the last check is missing or was changed.")
+    elif expected <= last:
         yield _missing(expected, last)
     for day, total in kept:
         if total.checks < day.checks:
             yield tr(
-                "Of the {count} checks of {day}, {missing} are missing.",
+                "Checks of {day} that are missing: {missing} of {count}.",
                 count=day.checks,
                 day=day.day,
                 missing=day.checks - total.checks,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from typing import Any, Final, TypeAlias, TypeVar
 
+from robolink.journal._places import without_user
 from robolink.journal.store import statements
 from robolink.journal.store.chain import canonical, digest, head_is_missing, storable
 from robolink.journal.store.connection import DatabaseConnection
@@ -152,7 +153,7 @@ class EntryRows:
         """
         for row in self.page(Filter(kinds=(EntryKind.JOURNAL,)), before=2, after=0, limit=1):
             said = json.loads(row["details"])
-            if said.get("from") == journal:
+            if without_user(str(said.get("from"))) == without_user(journal):
                 return int(said["last_number"]), str(said["last_hash"])
         return None
 

@@ -108,10 +108,10 @@ ADD_CHECK: Final = (
 FIRST_CHECK_HEAD: Final = (
     "INSERT INTO check_head (number, closed, kept_from, day) VALUES (0, 0, 1, '')"
 )
-CHECK_HEAD: Final = "SELECT number, closed, kept_from, day FROM check_head"
+CHECK_HEAD: Final = "SELECT number, day FROM check_head"
+CHECKED_CONTROLLERS: Final = "SELECT DISTINCT controller FROM checks"
 COUNT_CHECKS: Final = "UPDATE check_head SET number = number + :count"
 CLOSE_CHECKS: Final = "UPDATE check_head SET closed = :closed, kept_from = :kept_from, day = :day"
-LAST_OLD_CHECK: Final = "SELECT max(number) FROM checks WHERE number <= :closed AND at < :cutoff"
 FORGET_CHECKS: Final = "DELETE FROM checks WHERE number <= :last"
 
 

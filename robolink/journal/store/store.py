@@ -15,7 +15,7 @@ from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
 from robolink.journal._journal_loss import Traces, traces_of
-from robolink.journal._places import JournalPlace, place_of
+from robolink.journal._places import JournalPlace, place_of, without_user
 from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
 from robolink.journal.store.check_rows import CheckRows
@@ -93,7 +93,8 @@ class Tables:
         traces = traces_of((name,))
         if traces is None:
             return True
-        return traces.journal in ("", location) and self.entries.history(names)
+        here = without_user(traces.journal) in ("", without_user(location))
+        return here and self.entries.history(names)
 
     def goes_on(self, traces: Traces, names: tuple[str, ...], location: str) -> bool:
         """Return whether this still is the record of a controller, wherever it was moved.
@@ -105,7 +106,7 @@ class Tables:
         """
         if not self.entries.history(names):
             return False
-        if traces.newest is None or traces.journal == location:
+        if traces.newest is None or without_user(traces.journal) == without_user(location):
             return True
         if self.entries.holds(*traces.newest):
             return True
@@ -150,19 +151,28 @@ class Tables:
                 yield from ChainCheck.before(row).problems_of(row)
 
 
-def _was_left(arriving: Moved, here: JournalPlace) -> bool:
+def _was_left(arriving: Moved, here: JournalPlace, left: JournalPlace | None) -> bool:
     """Return whether the journal that a record comes from is sealed, so that it counts here.
 
     A process that was killed between the two seals leaves that to whoever opens the new one.
+
+    Args:
+        arriving: The record; its place is noted without a password.
+        here: This journal.
+        left: The place that whoever moves it has named, with its password.
     """
     try:
-        there = Store(place_of(arriving.place), read_only=True, glance=True)
+        if left is None or without_user(left.location) != without_user(arriving.place):
+            left = place_of(arriving.place)
+        there = Store(left, read_only=True, glance=True)
         with closing(there), there.read() as tables:
             moves = moves_in(tables.connection)
     except JournalError:
         return False  # moved_error says how to go on
-    same = (MoveState.MOVED, here.location, arriving.number, arriving.hash)
-    return any((move.state, move.place, move.number, move.hash) == same for move in moves)
+    same = (MoveState.MOVED, without_user(here.location), arriving.number, arriving.hash)
+    return any(
+        (move.state, without_user(move.place), move.number, move.hash) == same for move in moves
+    )
 
 
 class Store:
@@ -177,6 +187,7 @@ class Store:
         glance: Whether a file that cannot be read soon, or only without what others are writing,
             counts as one that cannot be read.
         arriving: Whether a journal that is still arriving is opened, to be filled anew.
+        left: The journal that it was moved out of, where whoever opens it knows its password.
     """
 
     def __init__(
@@ -186,11 +197,13 @@ class Store:
         read_only: bool,
         glance: bool = False,
         arriving: bool = False,
+        left: JournalPlace | None = None,
     ) -> None:
         self._place = place
         self._read_only = read_only
         self._glance = glance
         self._arriving = arriving
+        self._left = left
         self._lock = runtime.reentrant_lock()
         self._backend: Backend | None = None
         self._tables: Tables | None = None
@@ -388,7 +401,7 @@ class Store:
             return migrations.stored_version(connection, self._place.name)
         if move.state is MoveState.ARRIVING and self._arriving:
             return version % SEALED
-        if move.state is MoveState.MOVED or not _was_left(move, self._place):
+        if move.state is MoveState.MOVED or not _was_left(move, self._place, self._left):
             raise moved_error(move, self._place.name, tr("The command was not sent."))
         take_into_use(connection)
         connection.commit()

@@ -16,6 +16,7 @@ from typing import Any, Final
 from robolink.journal._lease_view import FREE
 from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck, canonical, digest
+from robolink.journal.store.check_rows import OF_CHECKS
 from robolink.journal.store.entry_rows import EntryRows, Filter
 from robolink.journal.store.store import Tables
 from robolink.model import EntryKind, NewEntry, Signature
@@ -43,7 +44,7 @@ class ChainCensus:
         check: Its end.
         problems: What is wrong with it, sentences.
         count: Number of entries under the names that were looked for; of all without names.
-        others: Whether there are entries under other names.
+        others: Whether there are entries about other controllers.
         numbers: Their numbers as runs: the first and how many.
         digest: SHA-256 over their numbers and hashes, one entry a line.
     """
@@ -68,7 +69,8 @@ def census(entries: EntryRows, names: Sequence[str]) -> ChainCensus:
     for row in chain.from_iterable(_pages(entries, before=last + 1)):
         found.problems += found.check.problems_of(row)
         if names and row["controller"] not in names:
-            found.others = True
+            # A closed day of checks is about no controller: who was checked, the checks say.
+            found.others = found.others or row["controller"] != OF_CHECKS
             continue
         found.count += 1
         number = row["number"]

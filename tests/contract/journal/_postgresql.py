@@ -17,6 +17,9 @@ from uuid import uuid4
 _NOBODY = 65534  # PostgreSQL refuses to run as root
 _START_S = 30.0
 
+ASKED_FOR_PASSWORD = "locked_out"
+"""A role, made by the test that needs it, that the server asks for its password."""
+
 
 def is_installed() -> bool:
     """Whether a server can be started here."""
@@ -125,6 +128,9 @@ def served() -> Iterator[Server]:
         with (folder / "data" / "postgresql.conf").open("a") as settings:
             settings.write("listen_addresses = '127.0.0.1'\nfsync = off\n")
             settings.write(f"unix_socket_directories = '{folder}'\n")
+        trust = folder / "data" / "pg_hba.conf"
+        asking = f"host all {ASKED_FOR_PASSWORD} 127.0.0.1/32 scram-sha-256\n"
+        trust.write_text(asking + trust.read_text())
         server = Server(folder, _free_port())
         server.start()
         try:

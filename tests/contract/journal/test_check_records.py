@@ -9,6 +9,7 @@ import pytest
 from robolink import runtime
 from robolink.errors import JournalError
 from robolink.journal import close_files, move_journal, open_journal
+from robolink.journal.store.check_rows import ClosedDay, problems_of_days
 from robolink.model import EntryKind, NewCheck, NewEntry, Signature
 
 WELL = NewCheck("epson:C-1/R-1", "line3", True, "No problem found.", {"tools": {"1": [1.5]}})
@@ -75,13 +76,22 @@ def test_each_day_becomes_one_entry_of_the_chain(journal, calendar):
 @pytest.mark.parametrize(
     ("statement", "told"),
     [
-        ("DELETE FROM checks WHERE number = 3", "Of the 2 checks of 2026-03-02, 1 are missing."),
-        ("DELETE FROM checks WHERE number IN (3, 4)", "Of the 2 checks of 2026-03-02, 2 are"),
+        ("DELETE FROM checks WHERE number = 3", "Checks of 2026-03-02 that are missing: 1 of 2."),
+        (
+            "DELETE FROM checks WHERE number IN (3, 4)",
+            "Checks of 2026-03-02 that are missing: 2 of 2.",
+        ),
         ("UPDATE checks SET well = 1 WHERE number = 4", "Check 4 was changed after it was"),
         ("UPDATE checks SET verdict = '' WHERE number = 7", "Check 7 was changed after it was"),
         ("DELETE FROM checks WHERE number = 7", "Check 7 is missing."),
-        ("UPDATE checks SET number = 17 WHERE number = 4", "Of the 2 checks of 2026-03-02, 1 are"),
+        (
+            "UPDATE checks SET number = 17 WHERE number = 4",
+            "Checks of 2026-03-02 that are missing: 1 of 2.",
+        ),
         ("UPDATE check_head SET kept_from = 7", None),
+        ("UPDATE check_head SET number = 5", "The note of the last check is missing or was"),
+        ("DELETE FROM check_head", "The note of the last check is missing or was changed."),
+        ("INSERT INTO check_head SELECT * FROM check_head", "The note of the last check is"),
     ],
 )
 def test_a_day_that_was_edited_or_deleted_is_found(journal, calendar, statement, told):
@@ -90,6 +100,60 @@ def test_a_day_that_was_edited_or_deleted_is_found(journal, calendar, statement,
         tables.connection.run(statement)
     problems = journal.verify().problems
     assert any(told in problem for problem in problems) if told else problems == ()
+
+
+@pytest.mark.parametrize(
+    ("statements", "told"),
+    [
+        (
+            ("DELETE FROM checks WHERE number <= 4", "UPDATE check_head SET kept_from = 5"),
+            "Checks of 2026-03-01 that are missing: 2 of 2.",
+        ),
+        (
+            ("UPDATE check_head SET closed = number", "DELETE FROM checks WHERE number = 3"),
+            "Checks of 2026-03-02 that are missing: 1 of 2.",
+        ),
+        (
+            ("UPDATE checks SET at = '2020-01-01' WHERE number = 4",),
+            "Check 4 was changed after it was recorded.",
+        ),
+    ],
+)
+def test_what_was_done_to_checks_and_their_note_shows_after_more_nights_too(
+    journal, calendar, statements, told
+):
+    nights(journal, calendar, 2)
+    with journal._store.write() as tables:
+        for statement in statements:
+            tables.connection.run(statement)
+    nights(journal, calendar, 2, keep_days=30)
+    assert [(one["first"], one["last"]) for one in days(journal)] == [
+        (1, 2),
+        (3, 4),
+        (5, 7),
+        (8, 9),
+    ]
+    assert told in journal.verify().problems
+
+
+@pytest.mark.parametrize("first", [2, 4])
+def test_days_that_do_not_follow_one_another_are_told(first):
+    days = [ClosedDay("2026-03-01", 1, 2, 2, "", 5), ClosedDay("2026-03-02", first, 4, 2, "", 5)]
+    assert [*problems_of_days(days, [], 4)] == [
+        "The checks of 2026-03-02 are not those that were recorded."
+    ]
+
+
+@pytest.mark.parametrize(
+    "damage", ["DELETE FROM check_head", "INSERT INTO check_head SELECT * FROM check_head"]
+)
+def test_a_check_without_the_note_of_the_last_one_is_refused_by_name(journal, calendar, damage):
+    journal.record_checks([WELL])
+    with journal._store.write() as tables:
+        tables.connection.run(damage)
+    with pytest.raises(JournalError, match="note of the last check is missing or was changed"):
+        journal.record_checks([WELL])
+    assert len(list(journal.checks())) == 1
 
 
 def test_a_check_whose_own_hash_was_made_anew_is_found_by_its_day(journal, calendar):
@@ -113,7 +177,7 @@ def test_old_days_go_and_no_entry_changes(journal, calendar):
     assert journal.verify().problems == ()
     with journal._store.write() as tables:
         tables.connection.run("DELETE FROM checks WHERE number <= 6")
-    assert "Of the 2 checks of 2026-03-03, 2 are missing." in journal.verify().problems
+    assert "Checks of 2026-03-03 that are missing: 2 of 2." in journal.verify().problems
 
 
 def test_who_does_not_say_how_long_deletes_nothing(journal, calendar):
@@ -138,6 +202,21 @@ def test_a_clock_that_goes_back_makes_a_further_day_and_loses_nothing(journal, c
         "2026-03-01",
     ]
     assert len(list(journal.checks())) == 7
+    assert journal.verify().problems == ()
+
+
+def test_a_clock_that_was_wrong_once_deletes_no_newer_day_and_keeps_no_old_one(journal, calendar):
+    for at in (1, 2, 3):
+        calendar.now = FIRST_DAY + datetime.timedelta(days=at)
+        journal.record_checks([WELL], keep_days=3)
+    calendar.now = FIRST_DAY + datetime.timedelta(days=9000)
+    journal.record_checks([WELL])
+    calendar.now = FIRST_DAY - datetime.timedelta(days=9000)
+    journal.record_checks([WELL], keep_days=3)
+    assert [one.number for one in journal.checks()] == [5, 4, 3, 2, 1]
+    calendar.now = FIRST_DAY
+    nights(journal, calendar, 7, keep_days=3)
+    assert [one.number for one in journal.checks()][-1] > 5
     assert journal.verify().problems == ()
 
 
@@ -193,6 +272,23 @@ def test_a_journal_that_is_moved_takes_its_checks_with_it(tmp_path, calendar):
     assert moved.verify().problems == ()
     with pytest.raises(JournalError, match="was moved"):
         journal.record_checks([WELL])
+    close_files()
+
+
+@pytest.mark.parametrize(("other", "moved"), [(WELL, ""), (ILL, WELL.controller)])
+def test_a_controller_is_alone_in_its_journal_though_it_was_checked(
+    tmp_path, calendar, other, moved
+):
+    """Its days of checks are no other controller; one that was only ever checked is."""
+    old, new = str(tmp_path / "old.db"), str(tmp_path / "new.db")
+    journal = open_journal(old)
+    journal.log(WELL.controller).append(NewEntry(EntryKind.DECISION, tool=1, verdict="kept"))
+    journal.record_checks([WELL, other])
+    calendar.now += datetime.timedelta(days=1)
+    journal.record_checks([WELL])
+    done = move_journal(new, source=old, controller=WELL.controller)
+    assert (done.controller, done.controllers) == (moved, (WELL.controller,))
+    assert len(list(open_journal(new).checks())) == (0 if moved else 3)
     close_files()
 
 

@@ -17,6 +17,7 @@ from robolink.errors import (
 from robolink.journal import LeaseHolder, move_journal, open_journal, open_log, plan_journal_move
 from robolink.journal import this_process as here
 from robolink.journal._connections import _closed, _opened, close_files
+from robolink.journal._journal_loss import traces_of
 from robolink.journal._places import place_of
 from robolink.journal.store import seal
 from robolink.journal.store.chain import canonical
@@ -25,6 +26,7 @@ from robolink.journal.store.store import Store
 from robolink.journal.store.transfer import renumbered
 from robolink.model import EntryKind, Identity, MarkerKind, NewEntry, Signature
 from tests.contract.journal._acts import marker, run
+from tests.contract.journal._postgresql import ASKED_FOR_PASSWORD
 
 A, B = "epson:RC1/T6-1", "epson:RC2/T6-2"
 AT_A, AT_B = "epson+tcp://192.168.0.1:5000", "epson+tcp://192.168.0.2:5000"
@@ -501,7 +503,7 @@ def test_whatever_was_stored_while_a_journal_is_moved_comes_along(
 
 
 def test_on_a_server_its_owner_moves_a_record_and_who_may_only_add_goes_on(
-    server, tmp_path, open_anew
+    server, tmp_path, open_anew, monkeypatch
 ):
     source, own = server.empty_place(), str(tmp_path / "own.db")
     worked(open_anew(source))
@@ -512,12 +514,41 @@ def test_on_a_server_its_owner_moves_a_record_and_who_may_only_add_goes_on(
     server.execute(f"GRANT SELECT, INSERT, UPDATE ON ALL TABLES IN SCHEMA {schema} TO {role}")
     server.execute(f"GRANT DELETE ON {schema}.markers TO {role}")
     as_role = source.replace("journal@", f"{role}@")
+    for computer in ("near", "far"):  # the cells work as that role, on the owner's computer too
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / computer))
+        worker = met(open_anew(as_role), A, AT_A)
+        worker.begin(marker("w"))
+        worker.clear("w")
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "near"))
     with pytest.raises(JournalError, match="does not let this user"):
         move_journal(own, source=as_role)
     assert not Path(own).exists()
     move_journal(own, source=source, controller=A)
+    noted = traces_of((A,))
+    assert noted is not None
+    assert noted.journal == place_of(own).location
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "far"))
+    assert met(open_anew(own), A, AT_A).open_markers() == ()
     others = met(open_anew(as_role), B, AT_B)
     others.begin(marker("x"))
     others.clear("x", NewEntry(EntryKind.DONE, tool=3))
     with pytest.raises(JournalError, match=f"record of {A} was moved"):
         open_anew(as_role).log(A).append(NewEntry(EntryKind.RAW))
+
+
+def test_out_of_a_server_that_asks_for_the_password_in_the_url(server, tmp_path, open_anew):
+    """No note holds the password, so only the URL of whoever moves the journal opens it again."""
+    place = server.empty_place()
+    schema = place.rpartition("%3D")[2]
+    server.execute(
+        f"CREATE ROLE {ASKED_FOR_PASSWORD} LOGIN PASSWORD 'geheim9'; "
+        f"GRANT ALL ON SCHEMA {schema} TO {ASKED_FOR_PASSWORD}"
+    )
+    source = place.replace("journal@", f"{ASKED_FOR_PASSWORD}:geheim9@")
+    with pytest.raises(JournalError, match="password"):
+        open_anew(source.replace("geheim9", "***"))
+    worked(open_anew(source))
+    for name, at, controller in ((A, AT_A, A), (B, AT_B, None)):
+        new = str(tmp_path / f"{controller is None}.db")
+        move_journal(new, source=source, controller=controller)
+        met(open_anew(new), name, at).append(NewEntry(EntryKind.RAW))

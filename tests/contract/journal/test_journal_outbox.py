@@ -177,6 +177,7 @@ def test_a_journal_that_was_changed_as_a_whole_is_found(cell, plant, act, said):
 def test_another_journal_in_its_place_takes_a_person(file, cell, open_anew, plant):
     record(cell, 2)
     copied(cell, plant)
+    cell.close()
     file.rename(file.with_suffix(".away"))
     for beside in ("-wal", "-shm"):
         Path(f"{file}{beside}").unlink(missing_ok=True)
@@ -190,6 +191,33 @@ def test_another_journal_in_its_place_takes_a_person(file, cell, open_anew, plan
     record(other, 1)
     assert copied(other, plant).copied_count == 1
     assert witness(other, plant).problems == ()
+    # The first one is put back: it is the journal of that place again, without a new entry.
+    other.close()
+    file.with_suffix(".away").replace(file)
+    for beside in ("-wal", "-shm"):
+        Path(f"{file}{beside}").unlink(missing_ok=True)
+    back = open_anew(str(file))
+    assert copied(back, plant).copied_count == 0
+    assert asked(plant, "SELECT max(replaced_by) FROM fleet.cell_heads") == [("",)]
+    back.close()
+    file.unlink()
+    record(third := open_anew(str(file)), 1)
+    assert refused(third, plant).plant_end[0] == 2
+
+
+def test_who_replaces_a_journal_hides_that_by_no_note_set_back(file, cell, open_anew, plant):
+    record(cell, 2)
+    copied(cell, plant)
+    file.rename(file.with_suffix(".away"))
+    for beside in ("-wal", "-shm"):
+        Path(f"{file}{beside}").unlink(missing_ok=True)
+    asked(plant, "UPDATE fleet.cell_heads SET number = 0, hash = ''")
+    record(other := open_anew(str(file)), 1)
+    for options in ({}, {"new_chain": True}):
+        with pytest.raises(ChainConflictError, match="its note names entry 0, but its last entry"):
+            copied(other, plant, **options)
+    assert witness(other, plant).problems
+    assert [number for number, *_ in asked(plant, ALL)] == [1, 2]
 
 
 def test_a_damaged_entry_is_not_copied_and_nothing_behind_it(cell, plant):
@@ -238,6 +266,8 @@ def test_a_journal_that_was_moved_is_still_the_same(file, cell, open_anew, plant
     cell.close()
     moved = open_anew(str(file.rename(file.with_name("moved.db"))))
     assert witness(moved, plant).problems == ()
+    assert copied(moved, plant).copied_count == 0  # but its home is noted
+    assert asked(plant, "SELECT home FROM fleet.cell_heads") == [(home_of(moved.location),)]
     record(moved, 1)
     assert copied(moved, plant).copied_count == 1
     # Its old place is free for another one.

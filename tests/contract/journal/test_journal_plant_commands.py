@@ -11,7 +11,11 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_cli.session.plant_outbox import copy_journals_in_use, copying_meanwhile
+from robolink_cli.session.plant_outbox import (
+    _Copying,
+    copy_journals_in_use,
+    copying_meanwhile,
+)
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -135,6 +139,15 @@ def test_a_plant_that_is_away_is_told_once_and_changes_no_exit_code(
     # It is told anew once it was back.
     monkeypatch.setenv("ROBOLINK_PLANT", silent)
     assert "did not answer within 1 s" in run(*write, "12")[2]
+
+
+def test_a_plant_that_answered_and_is_slow_is_not_told_as_one_that_is_away(plant, capsys):
+    copying = _Copying((), plant)
+    copying.answered.set()
+    copying.show(repeat=True)
+    told_here = " ".join(capsys.readouterr().err.split())
+    assert "Copying to the plant's database took more than 3 s." in told_here
+    assert "answer" not in told_here
 
 
 def test_a_plant_that_is_named_wrongly_changes_no_exit_code(run, cell, monkeypatch):
@@ -271,7 +284,9 @@ def test_verify_compares_with_the_plant(run, plant):
     assert (found["last_number"], found["plant"]["number"]) == (2, 3)
     (problem,) = found["problems"]
     assert "ends with entry 2" in problem
-    assert problem.split(":")[0] in run("journal", "verify")[1].replace("\n", " ")
+    out = run("journal", "verify")[1].replace("\n", " ")
+    assert problem.split(":")[0] in out
+    assert "checked: problems: 1." in out
 
 
 def test_verify_checks_what_it_can_where_the_plant_is_away(run, monkeypatch):

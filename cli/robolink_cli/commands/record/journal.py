@@ -232,11 +232,12 @@ def verify() -> int:
 
 
 def _show_verified(found: "ChainVerification", answer: PlantAnswer | None) -> None:
-    for problem in (*found.problems, *(answer.problems if answer else ())):
+    problems = (*found.problems, *(answer.problems if answer else ()))
+    for problem in problems:
         say(problem)
-    said = tr("problems: {count}", count=len(found.problems))
+    said = tr("problems: {count}", count=len(problems))
     whole = tr("nothing was changed and nothing is missing")
-    end = said if found.problems else whole
+    end = said if problems else whole
     say(tr("{count} entries checked: {end}.", count=found.checked, end=end))
     if answer is not None:
         say(answer.sentence())

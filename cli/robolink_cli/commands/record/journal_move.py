@@ -15,7 +15,7 @@ from robolink_cli.commands.record.journal_lookup import (
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit, say, say_listed
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.options.shared import json_option
+from robolink_cli.options.shared import json_option, origin_of
 
 if TYPE_CHECKING:
     from robolink.journal import JournalMove
@@ -46,7 +46,9 @@ def move(
     from robolink import __version__
     from robolink.journal import move_journal, plan_journal_move, signature_here
 
-    meant = controller_meant(controller)
+    # Whoever has named a cell for all commands has not said that its record leaves the journal.
+    typed = controller is not None or origin_of("url") != "ROBOLINK_CONTROLLER"
+    meant = controller_meant(controller) if typed else None
     source = place_to_read(meant)
     if dry_run:
         planned = plan_journal_move(to, controller=meant, source=source)
@@ -72,7 +74,7 @@ def _payload(found: "JournalMove", *, moved: bool) -> dict[str, object]:
 
 
 def _show_plan(found: "JournalMove") -> None:
-    say(tr("{count} entries would be moved:", count=found.entry_count))
+    say(tr("entries that would be moved: {count}", count=found.entry_count))
     _show_way(found)
     for error in found.hindrances:
         say(f"{error.what} {error.remedy}")
@@ -81,7 +83,7 @@ def _show_plan(found: "JournalMove") -> None:
 
 
 def _show_end(found: "JournalMove") -> None:
-    say(tr("{count} entries were moved:", count=found.entry_count))
+    say(tr("entries moved: {count}", count=found.entry_count))
     _show_way(found)
     say(
         tr(
@@ -96,8 +98,9 @@ def _show_end(found: "JournalMove") -> None:
 
 def _show_what_to_set(found: "JournalMove") -> None:
     from robolink.config import lines_naming_journal
+    from robolink.journal import shown_location
 
-    named = os.environ.get(_VARIABLE)
+    named = shown_location(os.environ.get(_VARIABLE, ""))
     if named:
         say(tr("{variable} still names the old one: {place}", variable=_VARIABLE, place=named))
     for path, number in lines_naming_journal(found.source):

@@ -8,6 +8,7 @@ from typing import Final
 from robolink.config._cells import Cell, load_cell_files
 from robolink.config._files import config_files, read_document, whole_place
 from robolink.journal import name_journals, shown_location
+from robolink.journal._places import without_user
 from robolink.transport import parse_url
 
 _KEY: Final = re.compile(
@@ -73,8 +74,8 @@ def lines_naming_journal(location: str) -> tuple[tuple[Path, int], ...]:
 
 
 def _bare(location: str) -> str:
-    """Return a location in one spelling: a path, or a URL without its driver."""
-    shown = shown_location(location)
+    """Return a location in one spelling: a path, or a URL without its driver and its user."""
+    shown = without_user(shown_location(location))
     return shown.replace("+psycopg", "") if "://" in shown else Path(shown).as_posix()
 
 

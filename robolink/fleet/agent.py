@@ -29,7 +29,7 @@ __all__ = ["Act", "Agent", "UNATTENDED"]
 
 Act = Callable[[Plan, str, Permit | None], JobOutcome]
 """Carries out the job of a plan at a cell under its order, by a permit where the plan needs
-one. It raises nothing."""
+one; without that it only looks up what became of the order. It raises nothing."""
 
 UNATTENDED: Final = frozenset({PlanKind.BACKUP, PlanKind.CHECK, PlanKind.DRIFT, PlanKind.OFFSET})
 """The kinds that an agent carries out. The others move a robot, and wait for a yes at the cell."""
@@ -152,6 +152,8 @@ class Agent:
             for plan in self._store.open_plans(self._plant):
                 try:
                     progress = self._store.progress(plan)
+                    if not progress.facts.window_open and any(map(_is_tried, progress.jobs)):
+                        progress = self._store.end_vain(plan)
                 except PlanError as error:  # it was changed in the database: the others go on
                     troubles.append(str(error))
                     continue
@@ -184,11 +186,14 @@ class Agent:
         """Hand out the due jobs of a plan; return whether nothing of it runs or will be due."""
         held = {order for order in self._held.copy() if order.startswith(f"{progress.plan.id}/")}
         if progress.facts.halt is not None:
-            running = engine.running()
-            if held - running:
-                engine.withdraw(held - running)
-                self._held -= held - running
-            return not held & running
+            # What was begun goes on, and is looked up where it was lost: all that is unsettled
+            # shows at once.
+            begun = {job.order for job in progress.jobs if job.state is JobState.RUNNING}
+            unbegun = held - begun - engine.running()
+            if unbegun:
+                engine.withdraw(unbegun)
+                self._held -= unbegun
+                held -= unbegun
         due, later = self._due(progress, len(held))
         # Noted first: a job may have ended before the call returns.
         self._held |= due.keys()
@@ -227,7 +232,8 @@ class Agent:
         if not _is_tried(job):
             return True
         waited = self._clock() - datetime.fromisoformat(job.ended_at)
-        return waited.total_seconds() >= pause_s(job.attempt)
+        # Less than nothing where the clock was set back: that must not prolong the pause.
+        return not 0 <= waited.total_seconds() < pause_s(job.attempt)
 
     def _say(self, trouble: str) -> None:
         """Tell once what keeps the agent from its work."""
@@ -249,11 +255,13 @@ class Agent:
             if not turn.begun:
                 raise JobEndedError(str(turn.why or turn.job.state))
             plan = self._insist(lambda: self._store.plan(plan_id))
-            permit = self._insist(lambda: self._store.permit_for(plan))
-            if permit is None and plan.needs_permit:
-                outcome = JobOutcome(9, "NotAllowedError", what="The permit was revoked meanwhile.")
-            else:
+            permit = None
+            if turn.may_write:
+                permit = self._insist(lambda: self._store.permit_for(plan))
+            if turn.may_write or plan.needs_permit:
                 outcome = self._act(plan, cell, permit)
+            else:
+                outcome = JobOutcome(5, "BusyError", what="The plan may not begin anything now.")
             attempt = turn.job.attempt
             ended = self._insist(
                 lambda: self._store.record_outcome(plan_id, cell, attempt, outcome)
@@ -282,4 +290,5 @@ class Agent:
 
 def _is_tried(job: CellJob) -> bool:
     """Whether a waiting job was begun before, in vain."""
-    return job.treatment is not None and job.treatment.again
+    tried = job.treatment is not None and job.treatment.again
+    return tried and job.state is JobState.WAITING

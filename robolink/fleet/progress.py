@@ -88,6 +88,11 @@ class Halt:
         return not self.lifted_at
 
     @property
+    def before_the_start(self) -> bool:
+        """Whether it only says that the plan was not started yet."""
+        return self.rule is HaltRule.PAUSE and self.numbers.get("ring") == 0
+
+    @property
     def sentence(self) -> str:
         """What a person is told of it."""
         told = {**self.numbers, "cell": self.cell, "by": self.by}
@@ -97,7 +102,9 @@ class Halt:
                 return tr("{by} halted it: {reason}", by=self.by, reason=reason)
             case HaltRule.PERSON:
                 return tr("{by} halted it.", by=self.by)
-            case HaltRule.PAUSE if told.get("ring") == 0:
+            case HaltRule.PAUSE if self.before_the_start and told.get("moves"):
+                return tr("It was not started yet: robolink fleet resume {plan}", plan=self.plan)
+            case HaltRule.PAUSE if self.before_the_start:
                 return tr("It was not started yet: robolink fleet run {plan}", plan=self.plan)
             case HaltRule.PAUSE:
                 return tr("Ring {ring} is finished; a person has to let the next begin.", **told)
@@ -195,6 +202,11 @@ class WaitFacts:
     most: int
     busy: frozenset[str] = frozenset()
 
+    @property
+    def may_write(self) -> bool:
+        """Whether a job that was begun before may still do what it has not done yet."""
+        return self.halt is None and self.window_open and self.permitted
+
     def why(self, job: CellJob) -> WaitReason:
         """Return why a waiting job waits: the one place where that is decided."""
         if self.halt is not None:
@@ -240,10 +252,14 @@ class Turn:
     Attributes:
         job: The job as it is on record.
         why: Why it waits; ``None`` where it does not.
+        may_write: For a job that was begun: whether it may do what it has not done yet. If not,
+            because the plan was halted, its window closed or its permit ended since, only what
+            became of its order is looked up.
     """
 
     job: CellJob
     why: WaitReason | None = None
+    may_write: bool = True
 
     @property
     def begun(self) -> bool:

@@ -71,7 +71,7 @@ _STATES: Final = {
     JobState.UNPROVED: declared("written, unproved until a turn test"),
     JobState.REFUSED: declared("refused; a person has to look"),
     JobState.UNSETTLED: declared("unsettled; next: robolink recover"),
-    JobState.MISSED: declared("missed: the cell did not answer in time"),
+    JobState.MISSED: declared("missed: the cell was busy or did not answer in time"),
     JobState.CANCELLED: declared("cancelled"),
 }
 
@@ -80,7 +80,7 @@ _WAITS: Final = {
     WaitReason.PAUSE: declared("a person has to let this ring begin"),
     WaitReason.RING: declared("an earlier ring is not finished"),
     WaitReason.WINDOW: declared("the plan's window is closed"),
-    WaitReason.PERMIT: declared("nobody has given a permit"),
+    WaitReason.PERMIT: declared("no permit holds now"),
     WaitReason.CELL_OFF: declared("the cell does not answer; it will be tried again"),
     WaitReason.CELL_BUSY: declared("the cell is busy; it will be tried again"),
     WaitReason.BUDGET: declared("as many cells are at work as the plan allows"),

@@ -59,6 +59,7 @@ class ControllerHolder:
         since: Since when it has the controller, as a label; empty where it did not say.
         process: Which process it is, as :class:`robolink.journal.LeaseHolder` takes it.
         brief: Whether it has the controller for a moment only, to check it.
+        keys: Far end and own name of the controller.
     """
 
     place: str | tuple[str, int]
@@ -71,6 +72,7 @@ class ControllerHolder:
     since: str = ""
     process: Mapping[str, object] = field(default_factory=dict, hash=False)
     brief: bool = False
+    keys: frozenset[str] = frozenset()
 
     def last_seen(self) -> LastSeen | None:
         """Return its last reading of its controller; ``None`` if it has none yet.
@@ -174,12 +176,12 @@ class HolderGoneError(Exception):
         self.pid = pid
 
 
-def holders_of(keys: Set[str], *, others: bool = False) -> Iterator[ControllerHolder]:
+def holders_of(keys: Set[str] | None, *, others: bool = False) -> Iterator[ControllerHolder]:
     """Yield the processes on this computer that have a controller, the latest first.
 
     Args:
         keys: Its far end (:func:`~robolink.transport.far_end_of`), and its own name where that is
-            known.
+            known; ``None`` for all controllers.
         others: Whether this process does not count.
 
     What a process that is gone has left is taken away.
@@ -213,11 +215,11 @@ def await_brief_holders(keys: Set[str], *, within_s: float) -> None:
         time.sleep(_AGAIN_S)
 
 
-def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
+def _read(card: Path, keys: Set[str] | None) -> ControllerHolder | None:
     try:
         said = json.loads(card.read_bytes())
         held, place, pid = set(said["keys"]), said["place"], int(said["pid"])
-        if not held & keys:
+        if keys is not None and not held & keys:
             return None
         if _is_gone(pid):
             card.unlink()
@@ -237,6 +239,7 @@ def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
             str(said.get("since", "")),
             dict(said.get("process", {})),
             brief=said.get("brief") is True,
+            keys=frozenset(map(str, held)),
         )
     except (OSError, ValueError, TypeError, KeyError, IndexError, RecursionError):
         return None

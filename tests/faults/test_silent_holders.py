@@ -4,6 +4,7 @@ The processes and the sockets are real; the silence is made, by a process whose 
 """
 
 import io
+import json
 import signal
 import subprocess
 import sys
@@ -25,7 +26,8 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink.errors import BusyError
 from robolink.journal import close_files, open_journal, this_process
 from robolink.model import EntryKind, ToolOffset
-from robolink.stopping import end_process
+from robolink.stopping import end_process, holders_of
+from robolink.transport import far_end_of
 from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
 from tests.faults._holding_process import HoldingProcess
@@ -267,6 +269,24 @@ def test_a_plc_shows_its_rest_itself(plc, held, types):
     (taken,) = marked(EntryKind.LEASE)
     assert "The controller showed" in taken.verdict
     assert open_journal().open_markers() == ()
+
+
+def test_a_process_that_has_other_controllers_too_is_not_ended(plc, held, types):
+    """An agent has sixteen: of the others nobody knows whether they stand still."""
+    first = held(plc, silent_s=20)
+    (one,) = holders_of(far_end_of(plc.url))
+    said = json.loads(one.card.read_bytes())
+    other = one.card.with_name(f"{first.pid}-ffffffff.json")
+    other.write_text(json.dumps(said | {"keys": ["epson 192.0.2.7 5000"], "controller": ""}))
+    first.freeze()
+    code, told = types(plc, *TAKE_OVER)
+    assert code == 6, told
+    assert "epson 192.0.2.7 5000" in told
+    assert "No process was ended" in told
+    assert first.exit_code is None
+    other.unlink()
+    assert types(plc, *TAKE_OVER)[0] == 0
+    assert first.exit_code == -signal.SIGKILL
 
 
 def test_a_plc_that_does_not_show_its_rest_keeps_its_client(plc, held, types, person):

@@ -1,6 +1,10 @@
 """What an agent does at a cell: once an order, recorded, and never by moving a robot."""
 
 import json
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -13,7 +17,8 @@ from robolink.errors import ConnectError
 from robolink.fleet import Permit, Treatment, plan_of, treatment_of
 from robolink.journal import default_location, open_journal
 from robolink.model import EntryKind, MarkerKind, ToolOffset
-from robolink.transport import parse_url
+from robolink.stopping import holders_of
+from robolink.transport import far_end_of, parse_url
 
 PERMIT = Permit(1, "plant", "Chen", "engineer", "2026-11-30", "2026-12-31")
 
@@ -37,7 +42,8 @@ def cell_file(simulator, tmp_path, monkeypatch):
 
 @pytest.fixture
 def acts(cell_file, tmp_path):
-    return CellActs(tmp_path / "backups")
+    with CellActs(tmp_path / "backups") as acts:
+        yield acts
 
 
 def plan(kind, **more):
@@ -71,6 +77,20 @@ def test_an_offset_is_written_once_however_often_it_is_delivered(acts, simulator
     assert entry.details["order"] == made.order("a")
     assert entry.signature.operator == "Chen"
     assert simulator.machine.motions.added == 0
+
+
+def test_without_a_permit_an_order_is_only_looked_up(acts, simulator):
+    made = plan("offset")
+    ended = acts(made, "a", None)
+    assert (ended.code, ended.error, treatment(ended)) == (5, "BusyError", Treatment.BUSY)
+    assert simulator.machine.flash_writes == 0
+    assert entries(EntryKind.ORDER) == []
+    assert acts(made, "a", PERMIT).what == "Written and read back."
+    assert acts(made, "a", None).what == "Written before."
+    with robolink.connect(simulator.url) as other:
+        other.begin(MarkerKind.SET, "TLSet 1", {"tool": 1})
+    assert treatment(acts(plan("offset", name="2"), "a", None)) is Treatment.UNSETTLED
+    assert simulator.machine.flash_writes == 1
 
 
 def test_a_backup_is_saved_once_and_is_whole(acts, simulator, tmp_path):
@@ -134,6 +154,52 @@ def test_a_cell_that_is_locked_off_or_unsettled_says_so(acts, simulator, cell_fi
     assert simulator.machine.flash_writes == 0
 
 
+@pytest.mark.parametrize("kind", ["backup", "check", "offset"])
+def test_a_stop_from_another_terminal_reaches_the_controller(kind, acts, simulator):
+    simulator.answer_s = 0.05
+    stopped: list[str] = []
+
+    def stop():
+        until = time.monotonic() + 20
+        while not stopped and time.monotonic() < until:
+            stopped.extend(one.ask_to_stop("Wang") for one in holders_of(far_end_of(simulator.url)))
+            time.sleep(0.005)
+
+    with ThreadPoolExecutor(1) as terminal:
+        asked = terminal.submit(stop)
+        ended = acts(plan(kind), "a", PERMIT)
+        asked.result()
+    assert stopped
+    assert (ended.code, ended.error, treatment(ended)) == (10, "StoppedError", Treatment.PERSON)
+    assert simulator.machine.flash_writes == 0
+
+
+def test_a_check_leaves_a_cell_alone_at_which_somebody_works(acts, simulator):
+    program = (
+        "import sys\n"
+        "from robolink.controllers import SimpleController\n"
+        "from robolink.stopping import StopListener\n"
+        "with StopListener(SimpleController(), sys.argv[1], who='Sato, at the cell'):\n"
+        "    print('here', flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program, simulator.url],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "here\n"
+        before = simulator.exchanges
+        ended = acts(plan("check"), "a", None)
+        assert other.stdin is not None
+        other.stdin.close()
+    assert (ended.code, treatment(ended)) == (5, Treatment.BUSY)
+    assert "Sato, at the cell" in ended.what
+    assert simulator.exchanges == before
+
+
 def test_the_cell_file_of_now_holds(acts, simulator, cell_file):
     said = f"[cells.a]\nurl = {json.dumps(simulator.url)}\n"
     cell_file.write_text(said + "max_change_mm = 0.1\n")
@@ -174,5 +240,6 @@ def test_a_defect_and_an_error_are_outcomes():
 
 def test_a_backup_folder_that_cannot_be_written_halts_the_plan(cell_file, tmp_path):
     (tmp_path / "file").write_text("")
-    ended = CellActs(Path(tmp_path / "file"))(plan("backup"), "a", None)
+    with CellActs(Path(tmp_path / "file")) as acts:
+        ended = acts(plan("backup"), "a", None)
     assert (ended.error, treatment(ended)) == ("PlanError", Treatment.HALT)

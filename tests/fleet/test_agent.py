@@ -19,6 +19,7 @@ from robolink.fleet import FleetStore, HaltRule, JobOutcome, JobState, plan_of
 from robolink.fleet.agent import Agent
 from robolink.fleet.agent_lock import AgentLock
 from robolink.fleet.errors import PlantError
+from robolink.fleet.store import statements
 from robolink.fleet.watchdog import UNIT, notify
 
 ROOT = Path(__file__).parents[2]
@@ -174,6 +175,39 @@ def test_an_agent_carries_plans_out_and_leaves_the_rest_alone(location, tmp_path
     assert "was changed after it was made" in told[0]
 
 
+def test_what_a_killed_agent_had_begun_is_looked_up_under_a_halt_too(location):
+    """What it had not written yet is not written, and all that is unsettled shows at once."""
+    lost = JobOutcome(6, "OutcomeUnknownError", what="no answer")
+    writing = plan(
+        "offset", rings=["*"], offsets={name: {"tool": 1, "x_mm": 1.0} for name in "abc"}
+    )
+    reading, permits = plan(), []
+    cells = Cells(a=[lost], b=[JobOutcome(0)], c=[lost])
+
+    def act(of, cell, given):
+        permits.append(given)
+        return cells(of, cell, given)
+
+    with FleetStore(location) as store:
+        store.add_plan(writing)
+        permit(store)
+        with store._database.transaction() as database:  # three at once, as in a later ring
+            for cell in "abc":
+                where = {"plan": writing.id, "cell": cell, "at": "2026-11-30T22:00:00+00:00"}
+                database.run(statements.BEGIN_JOB, where)
+        store.add_plan(reading)
+        assert store.begin(reading.id, "a").begun
+        for one in (writing, reading):
+            store.halt(one.id, "Li")
+    Agent(location, "plant", act).run_until_still()
+    found, progress = states(location, writing)
+    unsettled = JobState.UNSETTLED
+    assert found == {"a": unsettled, "b": JobState.UNPROVED, "c": unsettled}
+    assert permits == [None] * 3
+    assert set(states(location, reading)[0].values()) == {JobState.WAITING}
+    assert progress.finished
+
+
 @contextmanager
 def running(agent):
     """Have an agent run in a thread."""
@@ -209,7 +243,7 @@ def test_of_the_first_rings_one_cell_after_the_other_and_then_a_person(location)
     with FleetStore(location) as store, running(Agent(location, "plant", act)):
         store.add_plan(made)
         time.sleep(0.3)
-        assert most == []  # nobody has given a permit
+        assert most == []  # no permit holds
         permit(store)
         for ended in (1, 5, 7):
             until(lambda: ended == 7 or store.progress(made.id).standing)  # noqa: B023
@@ -256,6 +290,35 @@ def test_a_cell_that_is_off_is_tried_again_after_its_pause(location):
             ahead[0] += timedelta(minutes=3)
     assert states(location, made)[0]["b"] is JobState.KEPT
     assert cells.done[made.order("b")] == 3
+
+
+def test_a_cell_that_is_off_when_the_window_closes_is_missed_then(location):
+    off = JobOutcome(3, "ConnectError", what="not reached")
+    now = [datetime(2026, 11, 30, 23, 0).astimezone()]  # in the window, by this computer's clock
+    made = plan(window="22:00-05:00")
+    agent = Agent(location, "plant", Cells(b=[off]), clock=lambda: now[0])
+    with FleetStore(location, clock=lambda: now[0]) as store:
+        store.add_plan(made)
+        with running(agent):
+            until(lambda: store.progress(made.id).jobs[1].treatment)
+            now[0] += timedelta(hours=7)
+            until(lambda: store.progress(made.id).finished)
+    found, _ = states(location, made)
+    assert found == {"a": JobState.KEPT, "b": JobState.MISSED, "c": JobState.KEPT}
+
+
+def test_a_clock_that_is_set_back_delays_no_second_try(location):
+    off = JobOutcome(3, "ConnectError", what="not reached")
+    cells, ahead = Cells(b=[off, JobOutcome(0)]), [timedelta()]
+    made = plan()
+    with FleetStore(location) as store:
+        store.add_plan(made)
+        agent = Agent(location, "plant", cells, clock=lambda: datetime.now(UTC) + ahead[0])
+        with running(agent):
+            until(lambda: store.progress(made.id).jobs[1].treatment)
+            ahead[0] -= timedelta(days=1)
+            until(lambda: store.progress(made.id).finished)
+    assert cells.done[made.order("b")] == 2
 
 
 def test_a_unit_watches_the_agent():

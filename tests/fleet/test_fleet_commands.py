@@ -2,6 +2,7 @@
 
 import json
 import os
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -93,7 +94,7 @@ def test_every_waiting_job_says_why(run, document, plan):
     code, out, _ = run("status", plan)
     assert code == 0
     assert "3 waiting: an earlier ring is not finished" in out
-    assert "1 waiting: nobody has given a permit" in out
+    assert "1 waiting: no permit holds now" in out
     assert document("status", plan, "--why", "cell-0002")["why"] == "ring"
     assert "an earlier ring is not finished" in run("status", plan, "--why", "cell-0002")[1]
 
@@ -120,6 +121,55 @@ def test_a_plan_is_halted_and_goes_on(run, document, plan):
     code, _, err = run("resume", plan, "--reason", "again")
     assert code == 2
     assert "is not halted" in err
+
+
+@pytest.mark.parametrize("waits", ["permit", "window"])
+def test_run_says_that_not_everything_was_done(run, document, waits):
+    """Nothing runs, nothing is halted: it waits for a permit, or for its window."""
+    if waits == "window":
+        hour = (datetime.now().astimezone() + timedelta(hours=2)).hour
+        window = f"{hour:02}:00-{(hour + 1) % 24:02}:00"
+        Path("plan.toml").write_text(
+            'schema = "robolink/fleet-plan/1"\nkind = "drift"\nname = "n"\ncells = ["*"]\n'
+            f'window = "{window}"\n'
+        )
+    made = document("plan", "plan.toml")["plan"]
+    code, out, _ = run("run", made)
+    assert code == 1
+    assert "waiting" in out
+    assert document("status", made)["halts"][0]["reason"] == "started"
+
+
+def test_a_plan_that_moves_robots_says_that_no_agent_carries_it_out(run, document):
+    recipe = Path(__file__).parents[2] / "examples" / "recipes" / "scara-pin.toml"
+    Path("plan.toml").write_text(
+        'schema = "robolink/fleet-plan/1"\nkind = "recipe"\nname = "n"\ncells = ["*"]\n'
+        f"recipe = {json.dumps(str(recipe))}\n"
+    )
+    code, out, _ = run("plan", "plan.toml")
+    assert code == 0
+    assert "no agent carries it out" in out
+    assert "fleet run" not in out
+    made = document("status")["plans"][0]["plan"]
+    assert f"robolink fleet resume {made} --reason" in out
+    assert f"not started yet: robolink fleet resume {made}" in run("status", made)[1]
+    code, _, err = run("run", made)
+    assert code == 2
+    assert "A program of the plant carries it out" in err
+    code, out, _ = run("resume", made, "--reason", "the program runs")
+    assert code == 0
+    assert "no agent carries it out" in out
+
+
+def test_run_lifts_no_halt_of_a_person(run, document):
+    made = document("plan", "plan.toml")["plan"]
+    document("halt", made, "--reason", "the needles are wrong", "--operator", "Li")
+    code, _, err = run("run", made)
+    assert code == 2
+    assert "halted it: the needles are wrong" in err
+    assert "Nothing was started." in err
+    halts = document("status", made)["halts"]
+    assert [(one["rule"], one["lifted_by"]) for one in halts] == [("pause", None), ("person", None)]
 
 
 def test_a_plan_is_cancelled_for_good(run, document, plan):

@@ -62,6 +62,31 @@ def test_a_job_that_was_killed_is_handed_out_again_as_the_same_attempt(store, op
     assert again.job.attempt == 1
 
 
+def test_a_job_that_was_killed_does_nothing_anew_while_the_plan_may_not_go_on(store, wall):
+    plan = permitted(store, plan_with(window="22:00-05:00"))
+    assert store.begin(plan.id, FIRST).may_write
+
+    def may_write():
+        turn = store.begin(plan.id, FIRST)
+        assert turn.begun
+        return turn.may_write
+
+    store.halt(plan.id, "Chen")
+    assert not may_write()
+    store.resume(plan.id, "Chen", "")
+    assert may_write()
+    wall.go_on(hours=7)
+    assert not may_write()
+    wall.go_on(hours=17)
+    assert may_write()
+    store.revoke_permit(1, "Wang")
+    assert not may_write()
+    permitted(store, plan)
+    assert may_write()
+    store.cancel(plan.id, "Chen")
+    assert not may_write()
+
+
 def test_an_outcome_that_is_delivered_again_changes_nothing(store):
     plan = permitted(store, plan_with())
     first = carried_out(store, plan, FIRST)
@@ -219,6 +244,18 @@ def test_an_automatic_plan_waits_all_the_same_where_nothing_is_on_record(store):
     assert last.halt.rule is HaltRule.PAUSE
 
 
+@pytest.mark.parametrize("kind", ["check", "offset"])
+def test_an_automatic_plan_waits_where_a_cell_did_not_do_what_was_asked(store, kind):
+    plan = permitted(store, plan_with(9, kind, rings=[1, 2, 2, "rest"], auto=True, at_once=1))
+    well = JobOutcome(0, corrections=() if kind == "check" else (usual(),))
+    for cell in plan.rings[0] + plan.rings[1]:
+        assert carried_out(store, plan, cell, well).halt is None
+    assert carried_out(store, plan, plan.rings[2][0], REFUSED).halt is None
+    paused = carried_out(store, plan, plan.rings[2][1], well).halt
+    assert paused is not None
+    assert paused.rule is HaltRule.PAUSE
+
+
 @pytest.mark.parametrize(
     ("outcome", "rule"),
     [
@@ -255,13 +292,59 @@ def test_what_runs_when_a_plan_halts_comes_to_its_end(store):
     assert store.begin(plan.id, SECOND).begun
 
 
-def test_a_halted_plan_is_halted_once_and_resumed_once(store):
+def test_a_person_halts_a_plan_once_and_it_is_resumed_once(store):
     plan = permitted(store, plan_with(kind="check"))
     first = store.halt(plan.id, "Chen")
-    assert store.halt(plan.id, "Li") == first
+    other = store.halt(plan.id, "Li")
+    assert store.halt(plan.id, "Chen", "again") == first
+    assert store.halt(plan.id, "Li") == other
+    assert store.progress(plan.id).standing == (first, other)
     store.resume(plan.id, "Chen", "")
     with pytest.raises(PlanError, match="is not halted"):
         store.resume(plan.id, "Chen", "")
+
+
+@pytest.mark.parametrize(
+    ("outcome", "rule"),
+    [
+        (JobOutcome(70, "KeyError"), HaltRule.CAUSE),
+        (REFUSED, HaltRule.FIRST_RING),
+        (JobOutcome(0, corrections=(usual(),)), HaltRule.PAUSE),
+        (UNSETTLED, HaltRule.UNSETTLED),
+    ],
+)
+def test_a_halt_that_is_found_under_another_is_not_lost(store, outcome, rule):
+    plan = permitted(store, plan_with())
+    attempt = store.begin(plan.id, FIRST).job.attempt
+    store.halt(plan.id, "Chen")
+    found = store.record_outcome(plan.id, FIRST, attempt, outcome).halt
+    assert found is not None
+    assert found.rule is rule
+    store.halt(plan.id, "Li")
+    rules = [halt.rule for halt in store.progress(plan.id).standing]
+    assert rules == [HaltRule.PERSON, rule, HaltRule.PERSON]
+
+
+def test_what_a_halt_held_back_is_tried_again_at_once_when_it_is_lifted(store):
+    plan = permitted(store, plan_with(kind="check"))
+    attempt = store.begin(plan.id, FIRST).job.attempt
+    store.halt(plan.id, "Chen")
+    store.record_outcome(plan.id, FIRST, attempt, JobOutcome(5, "BusyError", what="held back"))
+    store.resume(plan.id, "Chen", "the line runs")
+    progress = store.progress(plan.id)
+    assert progress.why(progress.jobs[0]) is WaitReason.TURN
+    assert store.begin(plan.id, FIRST).job.attempt == attempt + 1
+
+
+def test_a_halt_that_nobody_saw_is_not_lifted(store):
+    plan = permitted(store, plan_with())
+    carried_out(store, plan, FIRST, JobOutcome(0, corrections=(usual(),)))
+    (seen,) = store.progress(plan.id).standing
+    later = store.halt(plan.id, "Chen")
+    (lifted,) = store.resume(plan.id, "Chen", "looked at it", seen=seen)
+    assert lifted.number == seen.number
+    assert store.progress(plan.id).standing == (later,)
+    assert why(store, plan, SECOND) is WaitReason.HALTED
 
 
 def test_a_person_halts_a_plan_that_pauses(store):
@@ -281,6 +364,19 @@ def test_a_cancelled_plan_begins_nothing_more(store):
         store.resume(plan.id, "Chen", "after all")
     assert store.begin(plan.id, SECOND).job.state is JobState.CANCELLED
     assert store.progress(plan.id).finished
+
+
+@pytest.mark.parametrize("outcome", [BUSY, OFF])
+def test_of_a_cancelled_plan_a_busy_cell_is_not_tried_again(store, outcome):
+    plan = permitted(store, plan_with())
+    assert store.begin(plan.id, FIRST).begun
+    assert store.cancel(plan.id, "Chen") == 5
+    ended = store.record_outcome(plan.id, FIRST, 1, outcome)
+    assert (ended.job.state, ended.halt) == (JobState.CANCELLED, None)
+    progress = store.progress(plan.id)
+    assert progress.finished
+    assert [halt.rule for halt in progress.halts] == [HaltRule.PERSON]
+    assert store.record_outcome(plan.id, FIRST, 1, UNSETTLED).job.state is JobState.UNSETTLED
 
 
 @EACH_DATABASE

@@ -120,7 +120,8 @@ MEANINGS: Final[dict[int, str]] = {
         "found a damaged record; `journal drift` found something unusual; "
         "`journal move` with `--dry-run` found something in the way; "
         "`check-contract` found a failed check; `cell doctor`, `cell ports` or `cell check` "
-        "found something that needs attention"
+        "found something that needs attention; `fleet run` left cells that did not do what was "
+        "asked"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
     3: (

@@ -120,10 +120,7 @@ class _Copying:
         """
         error = self._error
         if not self._ended:
-            error = ConnectError(
-                tr("The plant's database did not answer within {seconds:g} s.", seconds=CONNECT_S),
-                remedy=tr("The cell goes on working. Entries are copied once it answers."),
-            )
+            error = self._unfinished()
         shown = state_folder("plant") / "shown"
         once = isinstance(error, ConnectError) or not repeat
         kind = type(error).__name__ if error is not None else ""
@@ -137,6 +134,20 @@ class _Copying:
                 )
             )
         _keep(shown, kind)
+
+    def _unfinished(self) -> ConnectError:
+        if self.answered.is_set():
+            seconds = COPY_S + CONNECT_S
+            what = tr(
+                "Copying to the plant's database took more than {seconds:g} s.", seconds=seconds
+            )
+            return ConnectError(
+                what, remedy=tr("The rest is copied later. To copy it now: robolink journal sync")
+            )
+        return ConnectError(
+            tr("The plant's database did not answer within {seconds:g} s.", seconds=CONNECT_S),
+            remedy=tr("The cell goes on working. Entries are copied once it answers."),
+        )
 
 
 def _noted(path: Path) -> str:

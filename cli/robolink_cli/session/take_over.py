@@ -5,12 +5,14 @@ that may be the only one connected to it (docs/stopping.md, "A program that does
 """
 
 import time
+from contextlib import nullcontext, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink.errors import (
     ConfigError,
     ConnectError,
+    JournalError,
     LeaseHeldError,
     OutcomeUnknownError,
     RobolinkError,
@@ -23,7 +25,7 @@ from robolink.journal import (
     may_exist,
     open_journal,
 )
-from robolink.messages import joined, tr
+from robolink.messages import joined, listed, tr
 from robolink.model import EntryKind, NewEntry
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.stopping import ControllerHolder, end_process, holders_of, may_be_ended
@@ -86,7 +88,7 @@ class EndedProcess(NamedTuple):
         return NewEntry(EntryKind.LEASE, verdict=verdict, details=details)
 
 
-def holder_of(url: str) -> HolderProcess | None:
+def holder_of(url: str, *, glance: bool = False) -> HolderProcess | None:
     """Return the process of this computer that has a controller, other than this one.
 
     The record names it, and else the address that each command leaves while it is connected.
@@ -94,10 +96,18 @@ def holder_of(url: str) -> HolderProcess | None:
 
     Args:
         url: The controller.
+        glance: Whether a record that cannot be read counts as one that names nobody.
+
+    Raises:
+        JournalError: The record cannot be read.
     """
     if "+sim://" in url:
         return None  # a simulator inside of a process is nobody else's
-    return _on_record(url) or _at_address(url)
+    with suppress(JournalError) if glance else nullcontext():
+        found = _on_record(url)
+        if found is not None:
+            return found
+    return _at_address(url)
 
 
 def name_holder(url: str, error: ConnectError) -> RobolinkError:
@@ -110,7 +120,7 @@ def name_holder(url: str, error: ConnectError) -> RobolinkError:
     # A connection that was closed at once may have come before the first client's address did.
     at_once = isinstance(error.__cause__, TransportBrokenError)
     until = time.monotonic() + (_SHOWS_ITSELF_S if at_once else 0.0)
-    while (found := holder_of(url)) is None and time.monotonic() < until:
+    while (found := holder_of(url, glance=True)) is None and time.monotonic() < until:
         time.sleep(_AGAIN_S)
     if found is None:
         return error
@@ -140,8 +150,9 @@ def end_holder(context: CliContext, reason: str) -> EndedProcess | None:
         BusyError: The process cannot be ended from here.
         ConfigError: No reason was given.
         DeclinedError: The person said no; nothing was done.
-        OutcomeUnknownError: Nothing shows that the robot stands still; the process was not ended.
-            Or it was, and the stop that follows is not confirmed.
+        OutcomeUnknownError: Nothing shows that the robot stands still, or the process has other
+            controllers, too: it was not ended. Or it was, and the stop that follows is not
+            confirmed.
     """
     if not reason.strip():
         raise ConfigError(
@@ -151,6 +162,7 @@ def end_holder(context: CliContext, reason: str) -> EndedProcess | None:
     found = holder_of(url)
     if found is None:
         return None
+    _require_no_other(url, found)
     _agree(found)
     request = stop_request()._replace(named=context.cell.name if context.cell else url)
     stopped = _stopped(request)
@@ -158,11 +170,44 @@ def end_holder(context: CliContext, reason: str) -> EndedProcess | None:
     if stopped.error is not None:
         _require_seen_at_rest(stopped.error, found)
         rest = tr("A person pressed the emergency stop and saw that the robot stands still.")
+    _require_no_other(url, found)  # it may have connected to one meanwhile
     end_process(found.process)
     note(tr("Ended: {holder}.", holder=describe_holder(found.process)))
     if stopped.error is not None:
         _require_stopped(request)
     return EndedProcess(found.process, reason, rest)
+
+
+def _require_no_other(url: str, found: HolderProcess) -> None:
+    """Refuse to end a process that has other controllers: nobody looked at their robots.
+
+    Raises:
+        OutcomeUnknownError: It has; names them.
+    """
+    here = far_end_of(url)
+    others = sorted(
+        {
+            one.controller or min(one.keys)
+            for one in holders_of(None, others=True)
+            if one.pid == found.process.pid and not one.keys & here
+        }
+    )
+    if others:
+        raise OutcomeUnknownError(
+            listed(
+                tr(
+                    "{holder} has other controllers too, and whether their robots stand still is "
+                    "not known:",
+                    holder=describe_holder(found.process),
+                ),
+                others,
+            ),
+            remedy=tr(
+                "No process was ended. Type robolink stop for each of them and look at the robots, "
+                "then end process {pid} yourself.",
+                pid=found.process.pid,
+            ),
+        )
 
 
 def _on_record(url: str) -> HolderProcess | None:

@@ -1,9 +1,18 @@
 """One plan inside a transaction: what holds it back, how its jobs end, and when it halts."""
 
+from collections.abc import Iterable
 from datetime import datetime
 
 from robolink.fleet.errors import PlanError
-from robolink.fleet.halts import EndedJob, HaltFinding, HaltRule, RingTally, broken_rule, stage_of
+from robolink.fleet.halts import (
+    EndedJob,
+    HaltFinding,
+    HaltRule,
+    RingTally,
+    broken_rule,
+    shift_accepted,
+    stage_of,
+)
 from robolink.fleet.outcome_codes import MOST_TRIES, Treatment
 from robolink.fleet.plans import Plan
 from robolink.fleet.progress import CellJob, Halt, JobOutcome, RecordedOutcome, WaitFacts
@@ -30,15 +39,19 @@ class PlanCourse:
         plan: The plan.
         now: The time, with its zone.
         label: The same as it is stored.
+        cancelled: Whether the plan was cancelled.
 
     Args:
         database: The connection, within the transaction.
         plan: The plan.
         now: The time.
+        cancelled: Whether the plan was cancelled.
     """
 
-    def __init__(self, database: DatabaseConnection, plan: Plan, now: datetime) -> None:
-        self._database = database
+    def __init__(
+        self, database: DatabaseConnection, plan: Plan, now: datetime, cancelled: bool = False
+    ) -> None:
+        self._database, self.cancelled = database, cancelled
         self.plan, self.now, self.label = plan, now, label_of(now)
 
     def job(self, cell: str) -> CellJob:
@@ -110,9 +123,12 @@ class PlanCourse:
             treatment: What its end means.
             outcome: How it ended.
         """
+        if self.cancelled and state is JobState.WAITING:
+            state = JobState.CANCELLED  # it would wait for ever, and breaks no rule by that
         end = EndedJob(state, treatment, outcome.corrections)
+        counts = state.final and state is not JobState.CANCELLED
         judged = state.answered and end.judged
-        sequence = self.last_sequence() + 1 if state.final else 0
+        sequence = self.last_sequence() + 1 if counts else 0
         corrections = [one.as_json() for one in outcome.corrections]
         values = {
             "plan": self.plan.id,
@@ -132,7 +148,7 @@ class PlanCourse:
         self._database.run(statements.END_JOB, values)
         cell = {"plant": self.plan.plant, "cell": job.cell, "order_id": self.plan.order(job.cell)}
         self._database.run(statements.FREE_CELL, cell)
-        halt = self._checked(job, end) if state.final else None
+        halt = self._checked(job, end) if counts else None
         return RecordedOutcome(self.job(job.cell), halt)
 
     def _checked(self, job: CellJob, end: EndedJob) -> Halt | None:
@@ -159,11 +175,24 @@ class PlanCourse:
             and job.ring + 1 < len(self.plan.rings)
         ):
             known = sum(int(n) for ring, _, _, _, n in counts if ring == job.ring)
-            if not self.plan.auto or (known < answered and not self.plan.kind.reads):
+            well = answered == tally.ended and (known == answered or self.plan.kind.reads)
+            if not (self.plan.auto and well):
                 finding = HaltFinding(HaltRule.PAUSE, {"ring": job.ring + 1, "cells": tally.ended})
         if finding is None:
             return None
         return self.add_halt(finding, cell=job.cell)
+
+    def accepted_by(self, standing: Iterable[Halt]) -> tuple[str, int]:
+        """Return what is accepted by who lifts halts: the shifts, and behind which end of a job.
+
+        Args:
+            standing: The halts.
+        """
+        if not any(halt.rule.of_corrections for halt in standing):
+            return "", 0
+        whole = {"plan": self.plan.id, "after": 0, "first": 0, "last": len(self.plan.rings)}
+        shifts = shift_accepted(evidence_in(self._database, whole))
+        return canonical([[*key, *shift] for key, shift in shifts.items()]), self.last_sequence()
 
     def add_halt(
         self,
@@ -172,7 +201,9 @@ class PlanCourse:
         cell: str = "",
         by: str = "",
     ) -> Halt | None:
-        """Halt the plan, unless it is halted: two outcomes at once halt it once.
+        """Halt the plan, unless the same rule, or the same person, has halted it already.
+
+        Another one is kept beside the first: who lifts them has to know of both.
 
         Args:
             finding: The rule, and what it was found by.
@@ -180,9 +211,9 @@ class PlanCourse:
             by: Who halts it, where a person does.
 
         Returns:
-            The new halt; ``None`` where it is halted already.
+            The new halt; ``None`` where it stands already.
         """
-        if any(halt.rule is not HaltRule.PAUSE for halt in self.standing()):
+        if self._standing_of(finding.rule, by):
             return None
         values = {
             "plan": self.plan.id,
@@ -195,12 +226,49 @@ class PlanCourse:
         self._database.run(statements.ADD_HALT, values)
         return self.standing()[-1]
 
-    def standing(self) -> list[Halt]:
-        """Return the halts that nobody has lifted."""
-        return [
-            read_halt(row)
-            for row in self._database.rows(statements.STANDING, {"plan": self.plan.id})
-        ]
+    def halt_of(self, by: str, reason: str) -> Halt:
+        """Halt the plan in a person's name, once; return that halt.
+
+        Args:
+            by: Who halts it.
+            reason: Why.
+        """
+        finding = HaltFinding(HaltRule.PERSON, {"reason": reason} if reason else {})
+        return self.add_halt(finding, by=by) or self._standing_of(HaltRule.PERSON, by)[-1]
+
+    def _standing_of(self, rule: HaltRule, by: str) -> list[Halt]:
+        return [one for one in self.standing() if (one.rule, one.by) == (rule, storable(by))]
+
+    def to_lift(self, last: Halt | None) -> list[Halt]:
+        """Return the halts that a person lifts.
+
+        Args:
+            last: The last one that the person saw; ``None`` for all.
+
+        Raises:
+            PlanError: There are none, or the plan was cancelled.
+        """
+        if self.cancelled:
+            raise PlanError(
+                tr("Plan {plan} was cancelled.", plan=self.plan.id),
+                remedy=tr("Nothing was changed. Make a new plan for the cells that are left."),
+            )
+        found = self.standing(last)
+        if not found:
+            raise PlanError(
+                tr("Plan {plan} is not halted.", plan=self.plan.id),
+                remedy=tr("Nothing was changed."),
+            )
+        return found
+
+    def standing(self, last: Halt | None = None) -> list[Halt]:
+        """Return the halts that nobody has lifted, oldest first.
+
+        Args:
+            last: Leaves out those that came after this one.
+        """
+        rows = self._database.rows(statements.STANDING, {"plan": self.plan.id})
+        return [halt for halt in map(read_halt, rows) if last is None or halt.number <= last.number]
 
     def last_sequence(self) -> int:
         """Return the number of the last end of a job."""

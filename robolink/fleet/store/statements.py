@@ -64,7 +64,7 @@ END_JOB: Final = (
 )
 DELIVER_AGAIN: Final = (
     "UPDATE outcomes SET state = 'waiting', treatment = '', sequence = 0 "
-    "WHERE plan = :plan AND state = 'unsettled'"
+    "WHERE plan = :plan AND (state = 'unsettled' OR (state = 'waiting' AND error = 'BusyError'))"
 )
 CANCEL_JOBS: Final = (
     "UPDATE outcomes SET state = 'cancelled', ended_at = :at "
@@ -101,7 +101,8 @@ ADD_HALT: Final = (
 )
 LIFT_HALTS: Final = (
     "UPDATE halts SET lifted_at = :at, lifted_by = :by_whom, reason = :reason, "
-    "accepted = :accepted, accepted_until = :until WHERE plan = :plan AND lifted_at = ''"
+    "accepted = :accepted, accepted_until = :until WHERE plan = :plan AND lifted_at = '' "
+    "AND number <= :last"
 )
 ACCEPTED: Final = (
     "SELECT accepted, accepted_until FROM halts WHERE plan = :plan AND accepted <> '' "

@@ -10,7 +10,7 @@ from dataclasses import replace
 from datetime import datetime
 
 from robolink.fleet.errors import PlanError
-from robolink.fleet.halts import HaltFinding, HaltRule, shift_accepted
+from robolink.fleet.halts import HaltFinding, HaltRule
 from robolink.fleet.outcome_codes import Treatment, treatment_of
 from robolink.fleet.plans import Plan
 from robolink.fleet.progress import (
@@ -27,7 +27,6 @@ from robolink.fleet.store import statements
 from robolink.fleet.store.course import PlanCourse, state_after
 from robolink.fleet.store.database import FleetDatabase
 from robolink.fleet.store.rows import (
-    evidence_in,
     label_of,
     permit_values,
     read_halt,
@@ -121,7 +120,8 @@ class FleetStore:
                 database.run_many(statements.ADD_CELL, cells)
                 database.run_many(statements.ADD_JOB, rows)
                 if not starts:
-                    pause = HaltFinding(HaltRule.PAUSE, {"ring": 0, "cells": 0})
+                    numbers = {"ring": 0, "cells": 0, "moves": plan.kind.moves}
+                    pause = HaltFinding(HaltRule.PAUSE, numbers)
                     self._course(database, plan.id).add_halt(pause)
 
     def plan(self, plan: str) -> Plan:
@@ -195,11 +195,22 @@ class FleetStore:
 
     # ---- Jobs
 
+    def end_vain(self, plan: str) -> PlanProgress:
+        """End as missed what could not be done before the window closed; return how it stands.
+
+        Raises:
+            PlanError, PlantError: As :meth:`progress`.
+        """
+        with self._database.transaction() as database:
+            self._course(database, plan).miss()
+        return self.progress(plan)
+
     def begin(self, plan: str, cell: str) -> Turn:
         """Begin a job if it is its turn; the one gate that every delivery of it passes.
 
         A job that was begun and has not ended is handed out again, as the same attempt: its order
-        is carried out once, however often it is delivered. One that has ended is not begun again.
+        is carried out once, however often it is delivered. What it has not done yet it does only
+        if :attr:`Turn.may_write` says so. One that has ended is not begun again.
 
         Raises:
             PlanError: There is no such plan, or it has no such cell.
@@ -210,7 +221,7 @@ class FleetStore:
             course.miss()
             job = course.job(cell)
             if job.state is not JobState.WAITING:
-                return Turn(job)
+                return Turn(job, may_write=course.facts(frozenset()).may_write)
             where = {"plant": course.plan.plant, "cell": cell}
             (order,) = database.rows(statements.AT_WORK + database.row_lock, where)[0]
             busy = frozenset([cell] if order not in ("", course.plan.order(cell)) else [])
@@ -276,7 +287,7 @@ class FleetStore:
     def halt(self, plan: str, by: str, reason: str = "") -> Halt:
         """Halt a plan: nothing of it begins until it is resumed; what runs comes to its end.
 
-        A plan that is halted already stays so, by the same halt.
+        A plan that this person has halted already stays so, by the same halt.
 
         Args:
             plan: Its id.
@@ -300,21 +311,24 @@ class FleetStore:
             PlantError: The database cannot be used; the plan was not halted.
         """
         with self._database.transaction() as database:
-            course = self._course(database, plan)
-            finding = HaltFinding(HaltRule.PERSON, {"reason": reason} if reason else {})
-            return course.add_halt(finding, by=by) or course.standing()[-1]
+            return self._course(database, plan).halt_of(by, reason)
 
-    def resume(self, plan: str, by: str, reason: str) -> tuple[Halt, ...]:
+    def resume(
+        self, plan: str, by: str, reason: str, *, seen: Halt | None = None
+    ) -> tuple[Halt, ...]:
         """Let a halted plan, or the next ring after a pause, go on.
 
         If cells had moved alike, their shift is accepted: the next cells are compared with it. The
         order of a cell that is unsettled is delivered again: after ``recover`` there, which says
-        whether it was carried out; before that it ends unsettled again.
+        whether it was carried out; before that it ends unsettled again. A cell that was busy, or
+        interrupted and held back by the halt, is tried again at once.
 
         Args:
             plan: Its id.
             by: Who resumes it.
             reason: Why that is right.
+            seen: The last halt that the person saw; a later one stands. All are lifted unless
+                given.
 
         Returns:
             The halts that were lifted.
@@ -336,22 +350,8 @@ class FleetStore:
         """
         with self._database.transaction() as database:
             course = self._course(database, plan)
-            if self._plan(database, plan)[1]:
-                raise PlanError(
-                    tr("Plan {plan} was cancelled.", plan=plan),
-                    remedy=tr("Nothing was changed. Make a new plan for the cells that are left."),
-                )
-            standing = course.standing()
-            if not standing:
-                raise PlanError(
-                    tr("Plan {plan} is not halted.", plan=plan), remedy=tr("Nothing was changed.")
-                )
-            accepted, until = "", 0
-            if any(halt.rule.of_corrections for halt in standing):
-                whole = {"plan": plan, "after": 0, "first": 0, "last": len(course.plan.rings)}
-                shifts = shift_accepted(evidence_in(database, whole))
-                accepted = canonical([[*key, *shift] for key, shift in shifts.items()])
-                until = course.last_sequence()
+            standing = course.to_lift(seen)
+            accepted, until = course.accepted_by(standing)
             values = {
                 "plan": plan,
                 "at": course.label,
@@ -359,6 +359,7 @@ class FleetStore:
                 "reason": storable(reason),
                 "accepted": accepted,
                 "until": until,
+                "last": standing[-1].number,
             }
             database.run(statements.LIFT_HALTS, values)
             database.run(statements.DELIVER_AGAIN, {"plan": plan})
@@ -394,9 +395,7 @@ class FleetStore:
         """
         with self._database.transaction() as database:
             course = self._course(database, plan)
-            course.add_halt(
-                HaltFinding(HaltRule.PERSON, {"reason": reason} if reason else {}), by=by
-            )
+            course.halt_of(by, reason)
             values = {"plan": plan, "at": course.label}
             database.run(statements.CANCEL_PLAN, values)
             return database.run(statements.CANCEL_JOBS, values)
@@ -467,11 +466,13 @@ class FleetStore:
 
     def _course(self, database: DatabaseConnection, plan: str) -> PlanCourse:
         """Take the lock of a plan."""
-        if not database.rows(statements.LOCK_PLAN + database.row_lock, {"plan": plan}):
+        rows = database.rows(statements.LOCK_PLAN + database.row_lock, {"plan": plan})
+        if not rows:
             raise self._unknown(database, plan)
+        ((cancelled_at,),) = rows
         if plan not in self._plans:  # frozen, and 40 kB for 2,000 cells
             self._plans[plan] = self._plan(database, plan)[0]
-        return PlanCourse(database, self._plans[plan], self._clock())
+        return PlanCourse(database, self._plans[plan], self._clock(), bool(cancelled_at))
 
     def _unknown(self, database: DatabaseConnection, plan: str) -> PlanError:
         ids = [read_plan(document).id for document, _ in database.rows(statements.PLANS)]

@@ -7,20 +7,23 @@ in its journal.
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robolink.errors import ConfigError, JournalError, NotReadyError
+from robolink import errors
+from robolink.errors import BusyError, ConfigError, RobolinkError
 from robolink.fleet import JobOutcome, Permit, Plan, PlanKind
 from robolink.fleet.errors import PlanError
+from robolink.interrupts import ClosedAtExit
 from robolink.messages import in_english, joined, known_names, tr
-from robolink_cli.console.exit_codes import DIFFERENT, DONE, exit_code
+from robolink_cli.console.exit_codes import DIFFERENT, DONE, exit_code, exit_code_of
 
 if TYPE_CHECKING:
     from robolink.config import Cell, CellFiles
     from robolink.model import Controller, Signature
+    from robolink.stopping import SharedStopListener
 
 
 class _Job(NamedTuple):
@@ -29,14 +32,16 @@ class _Job(NamedTuple):
     Attributes:
         plan: The plan.
         cell: The cell, as its files say now.
-        permit: By which permit; ``None`` for a job that changes nothing.
+        permit: By which permit; ``None`` for a job that changes nothing, or may not any more.
         keep_days: For how many days checks are kept.
+        listener: Hears a stop from another terminal; ``None`` where that cannot be.
     """
 
     plan: Plan
     cell: "Cell"
     permit: Permit | None
     keep_days: int
+    listener: "SharedStopListener | None" = None
 
     @property
     def order(self) -> str:
@@ -57,29 +62,46 @@ class _Job(NamedTuple):
 
     @contextmanager
     def connected(self) -> "Iterator[Controller]":
-        """Connect to the controller, as a command does that nobody watches.
+        """Connect to the controller, as a command does that nobody watches; a stop reaches it.
 
         Raises:
-            RobolinkError: It is not reached, is not the one that the cell file names, or what is
-                done could not be recorded.
+            RobolinkError: It is not reached, is not the one that the cell file names, was stopped,
+                or what is done could not be recorded.
         """
+        with self.connect() as controller, controller.latch.ending(tr("The job")):
+            outcomes = controller.outcomes
+            if outcomes.trouble is not None:
+                raise outcomes.trouble
+            with (
+                nullcontext()
+                if self.listener is None
+                else self.listener.listening(controller, self.cell.url, name=outcomes.identity)
+            ):
+                yield controller
+        controller.latch.require_open(tr("The job"))  # a stop came while it was closing
+
+    def connect(self) -> "Controller":
+        """Return the connected controller."""
         from robolink.config import connect_cell
 
-        with connect_cell(self.cell, signature=self.signature()) as controller:
-            if controller.outcomes.trouble is not None:
-                raise controller.outcomes.trouble
-            yield controller
+        return connect_cell(self.cell, signature=self.signature())
 
 
-class CellActs:
+class CellActs(ClosedAtExit):
     """Carries out the jobs of plans; each call comes from a thread of its own.
+
+    While it has a controller, ``robolink stop`` in another terminal reaches that.
 
     Args:
         backups: Folder of the backups: in it a folder a plan, in that a file a cell.
+        tell: Receives sentences for people.
     """
 
-    def __init__(self, backups: Path) -> None:
+    def __init__(
+        self, backups: Path, *, tell: Callable[[str], None] = lambda _sentence: None
+    ) -> None:
         self._backups = backups
+        self._listener = _listener(tell)
         self._reading = threading.Lock()
         self._files: CellFiles | None = None
         self._as_of: tuple[tuple[int, int], ...] | None = None
@@ -90,11 +112,16 @@ class CellActs:
             PlanKind.OFFSET: _write_offset,
         }
 
+    def close(self) -> None:
+        """Hear no more stops."""
+        if self._listener is not None:
+            self._listener.close()
+
     def __call__(self, plan: Plan, cell: str, permit: Permit | None) -> JobOutcome:
         """Carry out the job of a plan at a cell; whatever happens is an outcome."""
         try:
             found, keep_days = self._cell(cell)
-            return self._kinds[plan.kind](_Job(plan, found, permit, keep_days))
+            return self._kinds[plan.kind](_Job(plan, found, permit, keep_days, self._listener))
         except Exception as error:  # a defect is told, too, and ends one job
             return outcome_of(error)
 
@@ -144,28 +171,20 @@ class CellActs:
 
 def _check(job: _Job) -> JobOutcome:
     """Look for unexpected changes and overdue checks, and put that on record."""
-    from robolink.backup import read_tools
-    from robolink.inspection import CellCheck, inspect, record_check
-    from robolink.timing import NS_PER_S, SystemClock
+    from robolink.inspection import check_cells
 
-    clock = SystemClock()
-    begun_ns = clock.now_ns()
-    with job.connected() as controller:
-        try:
-            found = inspect(controller, read_tools(controller), cell=job.cell)
-        except NotReadyError as error:
-            found = inspect(controller, error, cell=job.cell)
-        check = CellCheck(job.cell.name, found, None, (clock.now_ns() - begun_ns) / NS_PER_S)
-        kept = record_check(
-            check,
-            job.cell,
-            controller=controller,
-            signature=job.signature(),
-            keep_days=job.keep_days,
-        )
-    if kept.failure is not None:
-        raise JournalError(kept.failure.what, remedy=kept.failure.remedy)
-    return _found([one.sentence for one in found.findings])
+    (check,) = check_cells(
+        [job.cell],
+        connect=lambda _cell: job.connect(),
+        signature=job.signature(),
+        keep_days=job.keep_days,
+    )
+    if check.failure is not None:
+        kind = getattr(errors, check.failure.kind, RobolinkError)
+        what = in_english(check.failure.what)
+        return JobOutcome(exit_code_of(kind), error=check.failure.kind, what=what)
+    assert check.inspection is not None  # noqa: S101 - of a check that was made
+    return _found([one.sentence for one in check.inspection.findings])
 
 
 def _drift(job: _Job) -> JobOutcome:
@@ -200,6 +219,11 @@ def _write_offset(job: _Job) -> JobOutcome:
     ):
         if order.done is not None:
             return JobOutcome(DONE, what="Written before.", change=order.done.change)
+        if job.permit is None:
+            raise BusyError(
+                tr("Nothing was written: the plan may not begin anything now."),
+                remedy=tr("It is tried again when the plan may go on."),
+            )
         controller.tools.require_writable(tool)
         before = controller.tools.read(tool)
         kept = ToolOffset() if before is None or before.of_no_tool else before
@@ -207,6 +231,29 @@ def _write_offset(job: _Job) -> JobOutcome:
         wanted = Wanted(tool, replace(kept, **said), before)
         change_tools(controller, [wanted], order=order)
         return JobOutcome(DONE, what="Written and read back.")
+
+
+def _listener(tell: Callable[[str], None]) -> "SharedStopListener | None":
+    """Return what hears stops from other terminals; ``None`` where that cannot be."""
+    from robolink.journal import this_process
+    from robolink.stopping import SharedStopListener
+
+    who = this_process().os_user or "?"
+    try:
+        return SharedStopListener(
+            who=tr("{who} (plans of many cells)", who=who),
+            heard=lambda url, by: tell(
+                tr("{url}: stopped from another terminal by {who}.", url=url, who=by)
+            ),
+        )
+    except OSError as error:
+        tell(
+            tr(
+                "'robolink stop' in another terminal cannot reach this command: {cause}.",
+                cause=error.strerror or error,
+            )
+        )
+        return None
 
 
 def outcome_of(error: BaseException) -> JobOutcome:

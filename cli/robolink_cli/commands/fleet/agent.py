@@ -63,21 +63,22 @@ def agent(
     if systemd:
         hand_over(unit(plant, backups))
         return
-    made = made_agent(plant, backups)
-    if json_is_on():
-        about = {"schema": "robolink/fleet-agent/1", "plant": plant, "pid": os.getpid()}
-        hand_over(json.dumps(about))
-    else:
-        say(tr("Agent of plant {plant}. Ctrl-C ends it.", plant=plant))
-        sys.stdout.flush()
-    with copying_meanwhile(), ended_by_signals(made):
-        made.run()
+    with agent_here(plant, backups) as made:
+        if json_is_on():
+            about = {"schema": "robolink/fleet-agent/1", "plant": plant, "pid": os.getpid()}
+            hand_over(json.dumps(about))
+        else:
+            say(tr("Agent of plant {plant}. Ctrl-C ends it.", plant=plant))
+            sys.stdout.flush()
+        with copying_meanwhile(), ended_by_signals(made):
+            made.run()
 
 
-def made_agent(
+@contextmanager
+def agent_here(
     plant: str, backups: Path | None = None, tell: Callable[[str], None] = note
-) -> "Agent":
-    """Return an agent for this computer's cells.
+) -> Iterator["Agent"]:
+    """Have an agent for this computer's cells, which hears their stops within the block.
 
     Raises:
         ConfigError: The extra ``fleet`` is not installed.
@@ -88,8 +89,8 @@ def made_agent(
     from robolink.fleet.agent import Agent
     from robolink_cli.commands.fleet.acts import CellActs
 
-    acts = CellActs(backups or state_folder("fleet-backups"))
-    return Agent(default_plant(), plant, acts, tell=tell)
+    with CellActs(backups or state_folder("fleet-backups"), tell=tell) as acts:
+        yield Agent(default_plant(), plant, acts, tell=tell)
 
 
 def require_packages() -> None:

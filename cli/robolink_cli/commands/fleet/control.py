@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import click
 
 from robolink.messages import tr
-from robolink_cli.commands.fleet.plant import Operator, PlanId, open_plant, who
+from robolink_cli.commands.fleet.plant import Operator, PlanId, no_agent, open_plant, who
 from robolink_cli.console.render import emit, say
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import LINE, json_option
@@ -61,11 +61,14 @@ def resume(
     """
     with open_plant() as store:
         lifted = store.resume(plan, who(operator), reason)
+        moves = store.plan(plan).kind.moves
     payload = {"plan": plan, "lifted": [halt_payload(one) for one in lifted]}
 
     def show() -> None:
         for one in lifted:
             say(tr("Lifted: {why}", why=one.sentence))
         say(tr("Plan {plan} goes on.", plan=plan))
+        if moves:
+            say(no_agent())
 
     emit("fleet-resumed", payload, show)

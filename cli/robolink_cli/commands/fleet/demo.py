@@ -39,7 +39,7 @@ def demo(
 ) -> None:
     """Write an offset at twenty simulated cells, ring after ring, and kill the agent twice.
 
-    Each cell is written once, however often its job is delivered; what waits for a person, says so.
+    Each cell is written once, however often its job is delivered; what waits for a person says so.
     No machine is touched.
     """
     require_packages()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import click
 
 from robolink.messages import tr
-from robolink_cli.commands.fleet.plant import Operator, open_plant, who
+from robolink_cli.commands.fleet.plant import Operator, no_agent, open_plant, who
 from robolink_cli.console.render import emit, say, say_listed
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
@@ -60,5 +60,9 @@ def _show(made: "Plan", *, kept: bool) -> None:
         return
     if made.needs_permit:
         say(tr("It waits for a permit: robolink fleet permit give"))
-    say(tr("To start it: robolink fleet run {plan}", plan=made.id))
+    if made.kind.moves:
+        say(no_agent())
+        say(tr("To let it begin: robolink fleet resume {plan} --reason WHY", plan=made.id))
+    else:
+        say(tr("To start it: robolink fleet run {plan}", plan=made.id))
     say(tr("How it stands: robolink fleet status {plan}", plan=made.id))

@@ -70,3 +70,10 @@ def who(operator: str | None) -> str:
     here = signature_here(__version__)
     place = f"{here.os_user}@{here.host}"
     return f"{operator} ({place})" if operator else place
+
+
+def no_agent() -> str:
+    """Return what a person is told of a plan that moves robots."""
+    return tr(
+        "It moves robots: no agent carries it out, a program of the plant does (docs/fleet.md)."
+    )

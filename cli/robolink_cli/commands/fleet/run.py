@@ -6,8 +6,8 @@ import click
 
 from robolink.errors import LeaseHeldError
 from robolink.fleet.errors import PlanError
-from robolink.messages import tr
-from robolink_cli.commands.fleet.agent import Backups, ended_by_signals, made_agent
+from robolink.messages import listed, tr
+from robolink_cli.commands.fleet.agent import Backups, agent_here, ended_by_signals
 from robolink_cli.commands.fleet.plant import Operator, PlanId, open_plant, who
 from robolink_cli.console.exit_codes import DIFFERENT, DONE, UNKNOWN
 from robolink_cli.console.render import emit, say
@@ -26,20 +26,21 @@ _SHOWN: Final = ("plan", "finished", "states", "halts")
 def run(*, plan: PlanId, backups: Backups = None, operator: Operator = None) -> int:
     """Start PLAN. If an agent of its plant runs, that one carries it out, and this ends at once.
 
-    Otherwise this command is the agent until the plan is finished or waits for a person. Exit code
-    1 when cells ended otherwise than asked, or the plan is halted; 6 when one is unsettled.
+    Otherwise this command is the agent until the plan is finished or waits for a person, a permit
+    or its window. Exit code 1 when not every cell did what was asked: it ended otherwise or waits,
+    or the plan is halted; 6 when one is unsettled.
     """
     with open_plant() as store:
         found = store.plan(plan)
         require_unattended(found)
-        agent = made_agent(found.plant, backups)
-        start(store, plan, who(operator))
         holder = ""
-        try:
-            with ended_by_signals(agent):
-                agent.run_until_still()
-        except LeaseHeldError as error:
-            holder = error.holder
+        with agent_here(found.plant, backups) as agent:
+            start(store, plan, who(operator))
+            try:
+                with ended_by_signals(agent):
+                    agent.run_until_still()
+            except LeaseHeldError as error:
+                holder = error.holder
         progress = store.progress(plan)
     emit("fleet-run", _payload(progress, holder), lambda: _show(progress, holder))
     return DONE if holder else _code(progress)
@@ -58,19 +59,30 @@ def require_unattended(plan: "Plan") -> None:
                 plan=plan.id,
                 kind=plan.kind,
             ),
-            remedy=tr(
-                "Nothing was started. At each cell, type: robolink -c CELL change RECIPE "
-                "--order {order}",
-                order=plan.order("CELL"),
-            ),
+            remedy=tr("Nothing was started. A program of the plant carries it out: docs/fleet.md"),
         )
 
 
 def start(store: "FleetStore", plan: str, by: str) -> None:
-    """Start a plan that was not started yet."""
-    first = [halt for halt in store.progress(plan).standing if halt.numbers.get("ring") == 0]
-    if first:
-        store.resume(plan, by, tr("started"))
+    """Start a plan that was not started yet.
+
+    Raises:
+        PlanError: It was halted before: whoever lifts that gives a reason.
+    """
+    standing = store.progress(plan).standing
+    first = next((halt for halt in standing if halt.before_the_start), None)
+    if first is None:
+        return
+    others = [halt.sentence for halt in standing if halt is not first]
+    if others:
+        raise PlanError(
+            listed(tr("Plan {plan} is halted:", plan=plan), others),
+            remedy=tr(
+                "Nothing was started. To go on: robolink fleet resume {plan} --reason WHY",
+                plan=plan,
+            ),
+        )
+    store.resume(plan, by, tr("started"), seen=first)
 
 
 def _payload(progress: "PlanProgress", holder: str) -> dict[str, object]:
@@ -92,4 +104,4 @@ def _code(progress: "PlanProgress") -> int:
     if counts[JobState.UNSETTLED]:
         return UNKNOWN
     others = [state for state in counts if state.final and not state.answered]
-    return DIFFERENT if others or progress.standing else DONE
+    return DIFFERENT if others or progress.standing or not progress.finished else DONE

@@ -50,6 +50,16 @@ class JournalPlace:
     path: Path | None = None
     url: str = field(default="", repr=False)
 
+    def file_now(self) -> tuple[int, int] | None:
+        """Return which file is at its path: ``(0, 0)`` for none; ``None`` where it has no path."""
+        if self.path is None:
+            return None
+        try:
+            found = os.stat(self.path)
+        except FileNotFoundError:
+            return (0, 0)
+        return (found.st_dev, found.st_ino)
+
 
 _named: dict[str, str] = {}
 """Journals that the cell files name for this process, by the address of the controller; under an

@@ -121,23 +121,14 @@ class FleetDatabase:
             except BaseException:
                 connection.close()
                 raise
-            self._connection, self._file = connection, self._file_now()
-        elif self._file_now() != self._file:
+            self._connection, self._file = connection, self._place.file_now()
+        elif self._place.file_now() != self._file:
             # What is written to a file that nobody can open any more would be lost.
             raise PlantError(
                 tr("The plant's database {name} was moved or deleted.", name=self.name),
                 remedy=tr("Put it back, then repeat it. Without it no plan is known."),
             )
         return self._connection
-
-    def _file_now(self) -> tuple[int, int] | None:
-        if self._place.path is None:
-            return None
-        try:
-            found = os.stat(self._place.path)
-        except FileNotFoundError:
-            return (0, 0)
-        return (found.st_dev, found.st_ino)
 
     def _drop(self) -> None:
         connection, self._connection = self._connection, None

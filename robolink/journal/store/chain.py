@@ -78,7 +78,7 @@ class ChainCheck:
         number, expected = row["number"], self.number + 1
         if number > expected:
             yield _missing(expected, number - 1)
-        if not _is_unchanged(row):
+        if not is_unchanged(row):
             yield tr("Entry {number} was changed after it was stored.", number=number)
         elif number <= expected and row["previous"] != self.hash:
             yield tr("Entry {number} does not follow the one before it.", number=number)
@@ -109,7 +109,8 @@ def head_is_missing() -> str:
     return tr("The note that says which entry was stored last is missing.")
 
 
-def _is_unchanged(row: Mapping[str, Any]) -> bool:
+def is_unchanged(row: Mapping[str, Any]) -> bool:
+    """Whether a stored row is the one that its hash was made of."""
     try:
         return bool(row["hash"] == digest(row))
     except (TypeError, ValueError):  # a field contains something that robolink never stores

@@ -21,7 +21,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from robolink.journal.store import statements
-from robolink.journal.store.chain import canonical, digest, storable
+from robolink.journal.store.chain import canonical, digest, is_unchanged, storable
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.journal.store.entry_rows import DamagedHeadError, EntryRows, Filter
 from robolink.messages import plain, tr
@@ -287,7 +287,7 @@ def problems_of_days(
     expected = closed + 1
     for row in rows:
         number = row["number"]
-        if not _is_unchanged(row):
+        if not is_unchanged(row):
             yield tr("Check {number} was changed after it was recorded.", number=number)
         while day is not None and number > day.last:
             day, total = next(of_day, (None, DayDigest()))
@@ -311,13 +311,6 @@ def problems_of_days(
             )
         elif total.hash != day.hash:
             yield tr("The checks of {day} are not those that were recorded.", day=day.day)
-
-
-def _is_unchanged(row: Mapping[str, Any]) -> bool:
-    try:
-        return bool(row["hash"] == digest(row))
-    except (TypeError, ValueError):  # a field contains something that robolink never stores
-        return False
 
 
 def _missing(first: int, last: int) -> str:

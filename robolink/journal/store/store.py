@@ -6,7 +6,6 @@ whole, the newest entries of the journal and those of the controller. It is chea
 the whole journal; ``verify`` reads the rest.
 """
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from typing import Final
@@ -334,8 +333,8 @@ class Store:
             self._failures = (*_OF_FILES, *self._backend.failures)
         if self._tables is None:
             self._tables = self._connect(self._backend)
-            self._file = self._file_now()
-        elif to_write and self._file_now() != self._file:
+            self._file = self._place.file_now()
+        elif to_write and self._place.file_now() != self._file:
             raise JournalError(
                 tr("The journal {name} was moved or deleted.", name=self._place.name),
                 remedy=tr(
@@ -406,15 +405,6 @@ class Store:
         take_into_use(connection)
         connection.commit()
         return version % SEALED
-
-    def _file_now(self) -> tuple[int, int] | None:
-        if self._place.path is None:
-            return None
-        try:
-            found = os.stat(self._place.path)
-        except FileNotFoundError:
-            return (0, 0)
-        return (found.st_dev, found.st_ino)
 
     def _drop(self) -> None:
         tables, self._tables = self._tables, None

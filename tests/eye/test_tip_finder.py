@@ -106,6 +106,37 @@ def test_a_disc_has_no_bore_and_is_a_solid_tip():
     assert found.bore_ratio is None
 
 
+@pytest.mark.parametrize("turn_deg", [0, 20])
+def test_the_head_of_a_cross_head_screw_has_no_bore(turn_deg):
+    y, x = np.mgrid[0:160, 0:200]
+    far, angle = np.hypot(x - 101.3, y - 82.6), np.arctan2(y - 82.6, x - 101.3)
+    grey = drawn((101.3, 82.6, 20, 170), noise=0.0).astype(np.float32)
+    for turn in (math.radians(turn_deg), math.radians(turn_deg + 90)):
+        slot = np.clip(0.5 - (np.abs(far * np.sin(angle - turn)) - 2.4) / 1.2, 0, 1)
+        grey += slot * np.clip(0.5 - (far - 18) / 1.2, 0, 1) * (40 - grey)
+    grey = blurred(grey, 1.0) + np.random.default_rng(1).normal(0, 1.5, grey.shape)
+    assert reasons(np.clip(grey, 0, 255).astype(np.uint8), TipShape(20.0))
+
+
+def out_of_focus(bore, ground=40.0, level=75.0):
+    """Return a faint disc with a bore of some level, four pixels out of focus."""
+    grey = drawn((101.3, 82.6, 30, level), (101.3, 82.6, 16, bore), ground=ground, noise=0.0)
+    grey = blurred(grey.astype(np.float32), 4.0)
+    return np.clip(grey + np.random.default_rng(1).normal(0, 1.5, grey.shape), 0, 255)
+
+
+def test_a_faint_ring_out_of_focus_that_shows_the_ground_is_no_tip():
+    ring, tip_of_dark_bore = (out_of_focus(bore).astype(np.uint8) for bore in (40.0, 5.0))
+    assert RefusalCode.FAINT_EDGE in reasons(ring, TipShape(30.0))
+    (found,) = accepted(tip_of_dark_bore, TipShape(30.0))
+    assert found.edge_px is not None
+    assert found.edge_px > 8
+    # Of a station whose edge was taught, the width alone tells.
+    assert accepted(ring, TipShape(30.0, edge_px=8.0))
+    assert accepted(255 - tip_of_dark_bore, TipShape(30.0))
+    assert RefusalCode.FAINT_EDGE in reasons(255 - ring, TipShape(30.0))
+
+
 def test_a_hole_beside_the_middle_is_no_bore():
     grey = drawn((101.3, 82.6, 30, 180), (109.5, 82.6, 12, 15))
     assert reasons(grey, TipShape(30.0)) & {RefusalCode.BORE_ASIDE, RefusalCode.NO_BORE}

@@ -66,10 +66,22 @@ HEIGHT_FOR_ROUGHNESS: Final = 0.02
 """At this scatter, a share of the radius, the edge has to be twice as high."""
 
 HALVED_BY: Final = 0.04
-"""Scatter of an edge, as a share of the radius, that halves the score."""
+BORE_HALVED_BY: Final = 0.06
+"""Scatter of an edge, as a share of its radius, that halves the score: of a rim, of a bore."""
 
-LEAST_SCORE: Final = 0.36
-"""Rays of edge and bore and a round edge together: each may be poor, but not all of them."""
+LEAST_SCORE: Final = 0.38
+"""Rays of rim and bore, how round the worse of them is, and one middle: each may be poor, but not
+all of them. What is there by chance, or is the head of a screw, is poor in several; a worn tip is
+worn at its rim and its bore alike.
+"""
+
+GROUND: Final = 0.3
+STEEP: Final = 4.2
+"""A ring shows the ground: its bore is as bright as what is around it. About such a bore an edge of
+untaught width has to be as steep as so many grey levels per pixel of its width: rings far from the
+plane of focus are faint and wide. The darker the bore is than the ground, the less is asked, and
+nothing where it is so by this share of the face's height.
+"""
 
 MOST_OVAL: Final = 0.035
 MOST_LOBES: Final = (0.015, 0.6)
@@ -176,11 +188,14 @@ def judged(scene: Scene, circle: Circle) -> Candidate:
         limit = MOST_OF_TAUGHT * shape.edge_px
     if width > limit:
         refused.append(CandidateRefusal(RefusalCode.BLURRED, width, limit))
-    score = share / (1 + (circle.rms_px / (HALVED_BY * radius)) ** 2)
-    if shape.bore:
-        score *= bore.share if bore else 0.0
+    score = _score(share, circle, bore) if bore or not shape.bore else 0.0
     if score < LEAST_SCORE and not refused:
         refused.append(CandidateRefusal(RefusalCode.POOR_FIT, score, LEAST_SCORE))
+    steep = STEEP * width
+    if bore and shape.edge_px is None and height < steep and not refused:
+        steep *= 1 - min(1.0, _below_the_ground(scene, circle, bore.circle) / GROUND)
+        if height < steep:
+            refused.append(CandidateRefusal(RefusalCode.FAINT_EDGE, height, steep))
     x, y = circle.x_px, circle.y_px
     if not refused and rough:
         middle = centred_by_profile(scene.grey, circle, width)
@@ -192,6 +207,34 @@ def judged(scene: Scene, circle: Circle) -> Candidate:
     return Candidate(
         x, y, radius, score, share, width, bore.ratio if bore else None, tuple(refused)
     )
+
+
+def _score(share: float, circle: Circle, bore: Bore | None) -> float:
+    """Return how well rim and bore fit, 0 to 1: a product, as each part is evidence by itself."""
+    uneven = circle.rms_px / circle.radius_px / HALVED_BY
+    if bore:
+        uneven = max(uneven, bore.roughness / BORE_HALVED_BY)
+        share *= bore.share / (1 + (bore.aside / MOST_ASIDE) ** 2)
+    return share / (1 + uneven**2)
+
+
+def _below_the_ground(scene: Scene, circle: Circle, hole: Circle) -> float:
+    """Return how much darker a bore is than what is around the face; of a dark face, brighter.
+
+    As a share of the height of the face above the bore, 0 where it is not darker.
+    """
+    radius, within = circle.radius_px, hole.radius_px
+    between = 0.5 * (radius + within)
+
+    def level(of: Circle, start_px: float, end_px: float) -> float:
+        step_px = (end_px - start_px) / 8
+        rays = unrolled(scene.grey, of.x_px, of.y_px, start_px, end_px, step_px)
+        return circle.sign * float(np.median(rays.grey))
+
+    inside = level(hole, 0.0, max(1.5, 0.4 * within))
+    face = level(circle, between - 1, between + 1)
+    around = level(circle, 1.25 * radius, 1.5 * radius)
+    return max(0.0, around - inside) / max(1.0, face - inside)
 
 
 def _faults_of_the_edge(

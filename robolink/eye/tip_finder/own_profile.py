@@ -43,9 +43,10 @@ for the texture beside it.
 OFF_AXIS: Final = 0.006
 """How far the bore of a turned tip is off its axis, as a share of the rim's radius."""
 
-MOST_OFF: Final = 5.0
-"""Standard errors by which the two middles may differ; beyond, the bore is eccentric. Up to there
-it counts less and less: a step would let the place jump from picture to picture of one tip.
+MOST_OFF: Final = 0.08
+"""Share of the rim's radius by which the two middles may differ; beyond, the bore is eccentric. Up
+to there it counts less and less: a step would let the place jump from picture to picture of one
+tip, and so would a limit that follows the scatter, which changes with light and focus.
 """
 
 
@@ -112,5 +113,6 @@ def on_one_axis(
     of_rim = (RIM_ERROR * rim.rms_px) ** 2
     both = of_rim + (BORE_ERROR * bore.rms_px) ** 2 + (OFF_AXIS * rim.radius_px) ** 2
     dx, dy = bore.x_px - x, bore.y_px - y
-    trust = max(0.0, 1 - (dx * dx + dy * dy) / (MOST_OFF**2 * both)) ** 2
+    off = np.hypot(dx, dy) / (MOST_OFF * rim.radius_px)
+    trust = max(0.0, 1 - float(off) ** 2) ** 2
     return x + trust * of_rim / both * dx, y + trust * of_rim / both * dy

@@ -43,6 +43,13 @@ class EpsonRecipeCell(RecipeCell):
         machine.power_high, machine.parameters.speed = True, (30, 40, 50)
         machine.outputs.set(8, on=True)
         super().__init__(simulator, recipe_tools)
+        switch = machine.outputs.set
+
+        def noted(number: int, on: bool) -> None:
+            switch(number, on)
+            self.switched[number] = on
+
+        machine.outputs.set = noted  # type: ignore[method-assign]
 
     def _register(self) -> str:
         return epson.register(self.name, self.simulator, clock=self.clock)
@@ -99,8 +106,8 @@ class EpsonRecipeCell(RecipeCell):
         return self.requests().count("$Abort")
 
     def sent_as(self, number: int, on: bool) -> str:
-        """Return the request that switches an output, as a person reads it."""
-        return f"SetIO,{number},{on:d}"
+        """Return the request that switches an output, as its marker has it."""
+        return f"$SetIO,{number},{on:d}"
 
     def disturb(self, how: str) -> None:
         """Press the emergency stop, or open the safety guard."""

@@ -53,7 +53,7 @@ class OperatorProcess:
         forks = _client_process._FORKS
         self._line, far_end = forks.Pipe()
         task = (url, str(folder), name, wanted, later_s)
-        self._process = forks.Process(target=_operate, args=(far_end, task, stepwise))
+        self._process = forks.Process(target=_operate, args=(far_end, task, stepwise), daemon=True)
         self._process.start()
         far_end.close()
         self.state: Waiting | Ended | None = None
@@ -62,6 +62,7 @@ class OperatorProcess:
 
     def step(self) -> None:
         """Permit the next step; return at the one after it, or at the end."""
+        assert isinstance(self.state, Waiting), f"there is no further step: {self.state}"
         self._line.send(None)
         self._listen()
 
@@ -117,7 +118,7 @@ def _operate(
     os.environ["ROBOLINK_STATE_DIR"] = folder  # a PC of its own, in the place of the folder
     outcomes = open_journal(f"{folder}/journal.db").log(url, signature=signature, clock=clock)
     try:
-        with robolink.connect(url, outcomes=outcomes, timeout_s=1.0) as controller:
+        with robolink.connect(url, outcomes=outcomes, timeout_s=PATIENCE_S) as controller:
             if stepwise:
                 wait_at_each_step(line, outcomes)
             found = {tool: controller.tools.read(tool) for tool in wanted}

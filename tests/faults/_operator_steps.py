@@ -90,7 +90,8 @@ def _watch_window(wait: Wait) -> None:
 
 
 def _watch_mailbox(wait: Wait) -> None:
-    write, read_slot, read_head = MailboxWire.write, MailboxWire.read_slot, MailboxWire.read_head
+    write, read_slot = MailboxWire.write, MailboxWire.read_slot
+    read_head, read_response = MailboxWire.read_head, MailboxWire.read_response
     unseen: list[MailboxWire] = []
 
     def slot_read(wire: MailboxWire, slot: int) -> tuple[int, ...]:
@@ -105,15 +106,23 @@ def _watch_mailbox(wait: Wait) -> None:
         write(wire, words)
         unseen.append(wire)
 
-    def head_read(wire: MailboxWire) -> MailboxHead:
+    def before_answer() -> None:
         if unseen:
             unseen.clear()
             wait("mailbox answer")
+
+    def head_read(wire: MailboxWire) -> MailboxHead:
+        before_answer()
         return read_head(wire)
+
+    def response_read(wire: MailboxWire) -> tuple[int, ...]:
+        before_answer()  # where answers take longer than the PLC, no head is read first
+        return read_response(wire)
 
     MailboxWire.write = block_written  # type: ignore[method-assign, assignment]
     MailboxWire.read_slot = slot_read  # type: ignore[method-assign, assignment]
     MailboxWire.read_head = head_read  # type: ignore[method-assign, assignment]
+    MailboxWire.read_response = response_read  # type: ignore[method-assign, assignment]
 
 
 def _watch_journal(wait: Wait) -> None:

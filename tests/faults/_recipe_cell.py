@@ -6,7 +6,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from itertools import count
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import pytest
 from robolink_simulators.device.wire_record import WireRecord
@@ -25,6 +25,12 @@ from tests.faults._recipe_instants import (
 
 _names = count()
 
+_BY_THE_STOP: Final = "The emergency stop may have switched outputs off"
+_SWITCHED: Final = re.compile(
+    r"(?:Outputs stay as the recipe switched them|"
+    rf"{_BY_THE_STOP}; the recipe had switched): ([^.]*)\."
+)
+
 
 class _Terminal(io.StringIO):
     def isatty(self) -> bool:
@@ -40,6 +46,7 @@ class RecipeCell(ABC):
         shows_its_tool: Whether it shows which tool is selected in every state.
         clock: The clock of all parts.
         recipe_tools: The tools that the recipe changes.
+        switched: The outputs that the run switched, with their last state, past the wire.
     """
 
     disturbances: ClassVar[tuple[str, ...]]
@@ -52,6 +59,7 @@ class RecipeCell(ABC):
         self.recipe_tools = recipe_tools
         self.clock = WatchedClock()
         self.name = f"recipes-{next(_names)}"
+        self.switched: dict[int, bool] = {}
         self._hosted = simulator
         simulator.log = WireRecord(most=None)  # all of it, however long a run is
         self.url = self._register()
@@ -91,7 +99,7 @@ class RecipeCell(ABC):
 
     @abstractmethod
     def sent_as(self, number: int, on: bool) -> str:
-        """Return the request that switches an output, as a person reads it."""
+        """Return the request that switches an output, as its marker has it."""
 
     @property
     @abstractmethod
@@ -135,13 +143,30 @@ class RecipeCell(ABC):
         """Return the tools whose values have changed."""
         return {tool for tool, held in self.tools().items() if held != self.before[tool]}
 
-    def names_output(self, number: int, on: bool, said: str) -> bool:
-        """Whether the text ``said`` gives the state of an output."""
-        if "The emergency stop may have switched outputs off" in said and not on:
-            return True
-        left = re.search(r"Outputs stay as the recipe switched them: ([^.]*)\.", said)
-        states = left[1].split(", ") if left else []
-        return f"{number} {'on' if on else 'off'}" in states or self.sent_as(number, on) in said
+    def check_outputs_are_named(self, said: str, *, early: bool) -> None:
+        """What the end of a run says of outputs.
+
+        It names each that the run left otherwise than before, and none but its own. Once the run
+        has acted on the cell, it mentions that the controller may have switched more by itself.
+
+        Args:
+            said: How the run ended.
+            early: Whether it ended with an error.
+        """
+        words = " ".join(said.split())
+        left = _SWITCHED.search(words)
+        found = re.findall(r"(\d+) (on|off)", left[1] if left else "")
+        named = {int(number): state == "on" for number, state in found}
+        unproved = {marker.request for marker in self.open_markers()}  # these are named, too
+        for number, on in named.items():
+            doubtful = self.sent_as(number, not on) in unproved  # known is the state before it
+            assert self.switched.get(number) is on or doubtful, (named, self.switched, said)
+        for number, on in self.switched.items():
+            known = named.get(number) is on or self.sent_as(number, on) in unproved
+            assert known or on is self.outputs_before[number], (number, on, said)
+        by_itself = self.outputs() != {**self.outputs_before, **self.switched}
+        if early and by_itself and (self.switched or self.moves_asked()):
+            assert _BY_THE_STOP in words, said
 
     def check_motion_is_allowed(self) -> None:
         """A movement starts again when it is requested."""

@@ -51,7 +51,7 @@ def check_interrupted(cell: RecipeCell, ended: Ended, disturbance: Disturbance) 
         assert cell.changed() == set(), ended.err
         for tool in set(cell.writes()):
             assert f"The old value of tool {tool} is back" in ended.err
-    check_outputs_are_named(cell, ended)
+    cell.check_outputs_are_named(ended.err, early=ended.code != 0)
 
 
 def check_stopped(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> None:
@@ -71,7 +71,7 @@ def check_stopped(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> N
     if cell.changed() and not kept(cell):
         assert {marker.kind for marker in markers} & {MarkerKind.CHANGE, MarkerKind.SET}
         assert "recover" in ended.err
-    check_outputs_are_named(cell, ended)
+    cell.check_outputs_are_named(ended.err, early=ended.code != 0)
 
 
 def check_put_right(cell: RecipeCell, disturbance: Disturbance, *, offered: bool) -> None:
@@ -158,10 +158,3 @@ def check_markers_are_named(markers: Sequence[Marker], ended: Ended) -> None:
     for marker in markers:
         named = (marker.request, begun_in_words(marker))
         assert any(words in ended.err for words in named), (marker, ended.err)
-
-
-def check_outputs_are_named(cell: RecipeCell, ended: Ended) -> None:
-    """Outputs stay as they were switched, and the end of the run names their states."""
-    for number, on in cell.outputs().items():
-        if on is not cell.outputs_before[number]:
-            assert cell.names_output(number, on, ended.err), (number, on, ended.err)

@@ -42,6 +42,14 @@ class PlcRecipeCell(RecipeCell):
         self._plc.memory.define = counted  # type: ignore[method-assign]
         self._plc.group.outputs.switch(8, on=True)
         super().__init__(simulator, recipe_tools)
+        outputs = self._plc.group.outputs
+        switch = outputs.switch
+
+        def noted(number: int, on: bool) -> None:
+            switch(number, on)
+            self.switched[number] = on
+
+        outputs.switch = noted  # type: ignore[method-assign]
         assert self.changed() == set()
 
     def _register(self) -> str:
@@ -102,8 +110,8 @@ class PlcRecipeCell(RecipeCell):
         return self._commands().count("HALT")
 
     def sent_as(self, number: int, on: bool) -> str:
-        """Return the request that switches an output, as a person reads it."""
-        return f"WRITE_OUTPUT {number} 1" if on else f"WRITE_OUTPUT {number}."
+        """Return the request that switches an output, as its marker has it."""
+        return f"WRITE_OUTPUT {number} 1" if on else f"WRITE_OUTPUT {number}"
 
     def disturb(self, how: str) -> None:
         """Cut the drives' power, let one fail, or withdraw the machine's permit."""

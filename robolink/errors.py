@@ -9,6 +9,7 @@
     │   ├── DocumentError                  a JSON document of another class or a newer version
     │   ├── NotComparedError               a value not compared with the machine would change
     │   └── JournalError                   the journal cannot be written or read
+    │       └── NotAtHomeError             the cell is changed on another computer, its home
     ├── TransportError                     the connection failed
     │   ├── ConnectError (ConnectionError) no connection
     │   │   └── LoginUnansweredError       a connection, but no answer to the login
@@ -72,6 +73,7 @@ __all__ = [
     "LoginUnansweredError",
     "MotionTimeoutError",
     "NotAllowedError",
+    "NotAtHomeError",
     "NotComparedError",
     "NotReadyError",
     "NotReadyReason",
@@ -230,9 +232,7 @@ class DocumentError(ConfigError):
 
 
 class NotComparedError(ConfigError):
-    """A write would change a value that nobody has compared with the machine's own screen.
-
-    Nothing was sent.
+    """A write would change what nobody compared with the machine's screen. Nothing was sent.
 
     Attributes:
         tool: Number of the tool.
@@ -241,12 +241,7 @@ class NotComparedError(ConfigError):
     """
 
     def __init__(
-        self,
-        what: str,
-        *,
-        tool: int,
-        components: tuple[str, ...],
-        remedy: str = "",
+        self, what: str, *, tool: int, components: tuple[str, ...], remedy: str = ""
     ) -> None:
         super().__init__(what, remedy=remedy)
         self.tool = tool
@@ -255,6 +250,10 @@ class NotComparedError(ConfigError):
 
 class JournalError(ConfigError):
     """The journal cannot be opened, read or added to."""
+
+
+class NotAtHomeError(JournalError):
+    """The cell is changed on another computer alone, its home; nothing was sent."""
 
 
 class TransportError(RobolinkError):

@@ -74,7 +74,7 @@ class StopLatch:
 
     def __init__(self, controller: str) -> None:
         self._controller = controller
-        self._closed = False
+        self._closed = self._severed = False
         self._closings = 0
         self._stops = runtime.waiting_room()
         self._under_way = 0
@@ -105,6 +105,21 @@ class StopLatch:
         """Refuse everything from now on; never waits."""
         self._closings += 1
         self._closed = True
+
+    @property
+    def severed(self) -> bool:
+        """Whether it stays closed, as :meth:`sever` says."""
+        return self._severed
+
+    def sever(self) -> None:
+        """Close it for good; never waits. Nothing is restored or put back any more either.
+
+        For who cuts off a thread that hangs: whenever that one wakes up, it finds a controller
+        that somebody else may have recovered meanwhile. What stops, and looks, is still let
+        through.
+        """
+        self._severed = True
+        self.close()
 
     @contextmanager
     def stopping(self) -> Iterator[None]:
@@ -140,7 +155,7 @@ class StopLatch:
                     controller=self._controller,
                 )
             self._put_back.clear()
-            self._closed = False
+            self._closed = self._severed
 
     def admit(self, kind: CommandClass, request: str) -> None:
         """Refuse ``request`` if a stop forbids it; called under the lock of its exchange.
@@ -156,14 +171,18 @@ class StopLatch:
     def _require_admitted(self, kind: CommandClass, request: str) -> None:
         if kind in (CommandClass.LOOK, CommandClass.CALM):
             return
-        if kind is CommandClass.RESET and self._permits.__dict__.get("calms") == self._closings:
-            return
-        if kind is CommandClass.RESTORE and self.restores:
-            return
-        if kind is CommandClass.WRITE and self._permit("writing"):
+        if not self._severed and self._is_permitted(kind):
             return
         said = tr("{request} was not sent: the controller was stopped.", request=request)
         raise self._stopped(said, request)
+
+    def _is_permitted(self, kind: CommandClass) -> bool:
+        """Whether this thread resets, restores or puts back on purpose."""
+        if kind is CommandClass.RESET:
+            return self._permits.__dict__.get("calms") == self._closings
+        if kind is CommandClass.RESTORE:
+            return self.restores
+        return kind is CommandClass.WRITE and self._permit("writing")
 
     def require_open(self, request: str) -> None:
         """Refuse to start, or to continue, an operation of several exchanges.

@@ -19,7 +19,7 @@ from robolink.backup._comparison import (
     ToolState,
     take_backup,
 )
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, JournalError
 from robolink.files.durable import file_name, make_folder, state_folder
 from robolink.files.named import read_named, save_named
 from robolink.messages import tr
@@ -308,7 +308,7 @@ def keep_first_backup(
         Where it was saved, ``None`` when that was done before.
 
     Raises:
-        ConfigError: It cannot be stored. Nothing may be written then.
+        JournalError: It cannot be stored. Nothing may be written then.
         NotReadyError: The tools cannot be read now.
     """
     if not controller.outcomes.durable:
@@ -325,7 +325,7 @@ def keep_first_backup(
         make_folder(path.parent)
         save(backup, path)
     except (OSError, ConfigError) as error:
-        raise ConfigError(
+        raise JournalError(
             tr(
                 "robolink cannot back up the tools in {path}: {cause}.",
                 path=path,

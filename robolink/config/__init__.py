@@ -14,10 +14,8 @@ if TYPE_CHECKING:
     from robolink.config._cells import Cell as Cell
     from robolink.config._cells import CellFiles as CellFiles
     from robolink.config._cells import CellGlimpse as CellGlimpse
-    from robolink.config._cells import add_cell as add_cell
     from robolink.config._cells import cell_names as cell_names
     from robolink.config._cells import check_file as check_file
-    from robolink.config._cells import content_with_cell as content_with_cell
     from robolink.config._cells import find_cell as find_cell
     from robolink.config._cells import glimpse_of_cell as glimpse_of_cell
     from robolink.config._cells import group_names as group_names
@@ -33,6 +31,8 @@ if TYPE_CHECKING:
     from robolink.config._journals import lines_naming_journal as lines_naming_journal
     from robolink.config._journals import use_journals_of as use_journals_of
     from robolink.config._journals import use_journals_of_files as use_journals_of_files
+    from robolink.config._new_cells import add_cell as add_cell
+    from robolink.config._new_cells import content_with_cell as content_with_cell
     from robolink.config._plant import NamedPlant as NamedPlant
     from robolink.config._plant import named_plant as named_plant
     from robolink.config._reach import Expected as Expected
@@ -49,13 +49,14 @@ else:
         __name__,
         {
             "_cells": (
-                "Cell CellFiles CellGlimpse USUAL_CHANGE_MM add_cell cell_names check_file "
-                "content_with_cell find_cell glimpse_of_cell group_names load_cell_files "
+                "Cell CellFiles CellGlimpse USUAL_CHANGE_MM cell_names check_file "
+                "find_cell glimpse_of_cell group_names load_cell_files "
                 "load_cells select_cells settings_of_file"
             ),
             "_connecting": "connect_cell require_expected_robot",
             "_files": "ConfigFile Source config_files",
             "_journals": "lines_naming_journal use_journals_of use_journals_of_files",
+            "_new_cells": "add_cell content_with_cell",
             "_plant": "NamedPlant named_plant",
             "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
             "_selection": "GROUP_MARK names_meant",

@@ -12,9 +12,9 @@ from robolink.config._files import CELL_FILE, config_files, read_document, whole
 from robolink.config._reach import Expected
 from robolink.config._selection import GROUP_MARK, names_meant, unknown_cell
 from robolink.errors import ConfigError
-from robolink.files.durable import write_whole
 from robolink.files.key_problems import is_not_known, sentence
 from robolink.files.toml import Problem
+from robolink.journal import CellHome
 from robolink.messages import tr
 from robolink.model import ChangeLimits
 
@@ -137,6 +137,11 @@ class Cell:
             people=self.settings.people,
         )
 
+    @property
+    def home(self) -> CellHome:
+        """The computer where alone it is changed; without a name, whichever this is."""
+        return CellHome(self.name, self.settings.home or "")
+
     def limits(self, *, usual_mm: float = USUAL_CHANGE_MM) -> ChangeLimits:
         """Return how far a write may move a tip; more takes an engineer.
 
@@ -177,6 +182,12 @@ class CellFiles:
     keep_checks_days: int = USUAL_CHECKS_DAYS
     journal: str = ""
 
+    @property
+    def homes(self) -> dict[str, str]:
+        """The home of each cell that names one."""
+        named = {name: cell.home.computer for name, cell in self.cells.items()}
+        return {name: home for name, home in named.items() if home}
+
     def select(self, words: Iterable[str] = ()) -> tuple[Cell, ...]:
         """Return the cells that words name; see :func:`select_cells`.
 
@@ -211,6 +222,7 @@ def load_cell_files() -> CellFiles:
     groups: dict[str, tuple[str, ...]] = {}
     keep_days: int | None = None
     journal: tuple[str, Path] | None = None
+    home: tuple[str, Path] | None = None
     for file in config_files():
         if file.present:
             content = _checked(file.path)
@@ -218,11 +230,14 @@ def load_cell_files() -> CellFiles:
             keep_days = content.keep_checks_days if keep_days is None else keep_days
             if journal is None and content.journal is not None:
                 journal = whole_place(content.journal, file.path), file.path
+            if home is None and content.home is not None:
+                home = content.home, file.path
             for name, settings in content.cells.items():
                 known = said.setdefault(name, [])
                 if not known or known[-1][1].url is None:
                     known.append((file.path, settings))
-    cells = {name: _cell(name, parts, journal) for name, parts in said.items()}
+    otherwise = {"journal": journal, "home": home}
+    cells = {name: _cell(name, parts, otherwise) for name, parts in said.items()}
     days = USUAL_CHECKS_DAYS if keep_days is None else keep_days
     return CellFiles(cells, groups, days, journal[0] if journal else "")
 
@@ -365,14 +380,16 @@ def _checked(path: Path) -> "CellFile":
 
 
 def _cell(
-    name: str, parts: "Sequence[tuple[Path, CellSettings]]", journal: tuple[str, Path] | None
+    name: str,
+    parts: "Sequence[tuple[Path, CellSettings]]",
+    otherwise: Mapping[str, tuple[str, Path] | None],
 ) -> Cell:
     """Return a cell from what the files say of it, the nearest first.
 
     Args:
         name: Its name.
         parts: What each file says of it.
-        journal: What a file says of all cells that name no journal, and that file.
+        otherwise: What a file says of all cells without such a key of their own, and that file.
 
     Raises:
         ConfigError: Together they are wrong, or none has a URL.
@@ -383,9 +400,10 @@ def _cell(
         origins = dict.fromkeys(settings.model_fields_set, path)
     else:
         settings, origins = _together(name, parts)
-    if journal is not None and settings.journal is None:
-        settings = settings.model_copy(update={"journal": journal[0]})
-        origins = {**origins, "journal": journal[1]}
+    for key, default in otherwise.items():
+        if default is not None and getattr(settings, key) is None:
+            settings = settings.model_copy(update={key: default[0]})
+            origins = {**origins, key: default[1]}
     if settings.url is None:
         missing = Problem(dotted(["cells", name, "url"]), tr("is missing in every file"))
         raise CELL_FILE.refusal(parts[0][0], [missing])
@@ -427,73 +445,3 @@ def _together(
             Problem(f"{cell}.{problem.where}", problem.what) for problem in problems_of(error, {})
         ]
         raise CELL_FILE.refusal(parts[0][0], problems) from error
-
-
-def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:
-    """Add a cell to a cell file; the rest of the file stays as it is, to the byte.
-
-    Args:
-        path: The file; it is made where there is none.
-        name: The cell's name.
-        said: Its keys, in this order.
-
-    Raises:
-        ConfigError: The file has a cell of that name, is wrong, or would be; nothing is written.
-
-    Example:
-        >>> from pathlib import Path
-        >>> from robolink.config import add_cell, cell_names
-        >>> add_cell(Path("robolink.toml"), "line3", {"url": "epson+tcp://192.168.0.1:5000"})
-        >>> cell_names()
-        ['line3']
-    """
-    content = content_with_cell(path, name, said)
-    try:
-        write_whole(path, content, mode=0o666)
-    except OSError as error:
-        raise ConfigError(
-            tr("{path} cannot be written: {cause}.", path=path, cause=error.strerror or error),
-            remedy=tr("Nothing was written."),
-        ) from error
-
-
-def content_with_cell(path: Path, name: str, said: Mapping[str, str | float]) -> bytes:
-    r"""Return a cell file's content with one more cell, as far as its keys are known by now.
-
-    Args:
-        path: The file; it is read where there is one.
-        name: The cell's name.
-        said: Its keys, in this order.
-
-    Raises:
-        ConfigError: The file has a cell of that name, is wrong, or would be.
-
-    Example:
-        >>> from pathlib import Path
-        >>> from robolink.config import content_with_cell
-        >>> content_with_cell(Path("new-cell-example.toml"), "line3", {})
-        b'[cells."line3"]\n'
-    """
-    before = CELL_FILE.read(path) if path.exists() else b""
-    cells = CELL_FILE.parse(path, before).get("cells")
-    if isinstance(cells, dict) and name in cells:
-        raise ConfigError(
-            tr("{path} has a cell {name} already.", path=path, name=name),
-            remedy=tr(
-                "Nothing was written. Choose another name, or change that cell in an editor."
-            ),
-        )
-    rows = [f"[cells.{_quoted(name)}]", *(f"{key} = {_quoted(one)}" for key, one in said.items())]
-    gap = b"" if not before else b"\n" if before.endswith(b"\n") else b"\n\n"
-    content = before + gap + "\n".join([*rows, ""]).encode()
-    problems = problems_in(CELL_FILE.parse(path, content))
-    if problems:
-        error = CELL_FILE.refusal(path, problems)
-        error.remedy = tr("Nothing was written.")
-        raise error
-    return content
-
-
-def _quoted(value: str | float) -> str:
-    """Return a value as TOML has it; of text JSON's way of writing is one of TOML's."""
-    return json.dumps(value)

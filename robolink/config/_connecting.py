@@ -22,8 +22,9 @@ def connect_cell(
 ) -> Controller:
     """Connect to the controller of a cell, by all that its file says.
 
-    Its limits, its acceleration, its time-outs, its journal and the place of its password count.
-    Another robot than the cell's is refused.
+    Its limits, its acceleration, its time-outs, its journal, its home and the place of its password
+    count. Another robot than the cell's is refused. On another computer than its home it can be
+    looked at and stopped: :attr:`~robolink.model.OutcomeLog.trouble` names the home.
 
     Args:
         cell: The cell, or its name.
@@ -46,14 +47,14 @@ def connect_cell(
         1
     """
     cell = find_cell(cell) if isinstance(cell, str) else cell
-    settings = cell.settings
+    settings, url = cell.settings, parse_url(cell.url)
     if password is None:
         password = find_password(
-            parse_url(cell.url).identity,
+            url.identity,
             cell_file=settings.password_file,
             cell_variable=settings.password_env,
         )
-    name_journals({parse_url(cell.url).address: settings.journal or ""})
+    name_journals({url.address: settings.journal or ""}, homes={url.address: cell.home})
     controller = connect(
         cell.url,
         password=password,

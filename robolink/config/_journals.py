@@ -19,6 +19,8 @@ _KEY: Final = re.compile(
 def use_journals_of(cells: Iterable[Cell], otherwise: str = "") -> None:
     """Look for the journals of cells where their files say, from now on in this process.
 
+    Their homes count from then on, too.
+
     The environment goes before: :func:`robolink.journal.default_location`.
 
     Args:
@@ -32,18 +34,22 @@ def use_journals_of(cells: Iterable[Cell], otherwise: str = "") -> None:
         >>> add_cell(Path("robolink.toml"), "line3", said)
         >>> use_journals_of(select_cells(["line3"]))
     """
-    places = {parse_url(cell.url).address: cell.settings.journal or "" for cell in cells}
-    name_journals({**places, "": otherwise}, afresh=True)
+    of = {parse_url(cell.url).address: cell for cell in cells}
+    places = {address: cell.settings.journal or "" for address, cell in of.items()}
+    homes = {address: cell.home for address, cell in of.items()}
+    name_journals({**places, "": otherwise}, homes=homes, afresh=True)
 
 
 def use_journals_of_files() -> None:
     """Look for all journals where the cell files say, from now on in this process.
 
+    Homes count from then on, too.
+
     Raises:
         ConfigError: A cell file is wrong: the journal that it names is not known.
     """
     present = [file.path for file in config_files() if file.present]
-    if any(_says_a_journal(read_document(path)) for path in present):
+    if any(_says_where(read_document(path)) for path in present):
         files = load_cell_files()
         use_journals_of(files.cells.values(), files.journal)
 
@@ -79,7 +85,8 @@ def _bare(location: str) -> str:
     return shown.replace("+psycopg", "") if "://" in shown else Path(shown).as_posix()
 
 
-def _says_a_journal(document: dict[str, object]) -> bool:
+def _says_where(document: dict[str, object]) -> bool:
+    """Return whether a file names a journal or a home."""
     cells = document.get("cells")
-    tables = cells.values() if isinstance(cells, dict) else ()
-    return any("journal" in table for table in (document, *tables) if isinstance(table, dict))
+    tables = (document, *(cells.values() if isinstance(cells, dict) else ()))
+    return any(not {"journal", "home"}.isdisjoint(one) for one in tables if isinstance(one, dict))

@@ -51,6 +51,7 @@ class Reach:
         password_env: Environment variable that holds the password; empty for none.
         timeout_s: Longest wait for one answer; 0 where nothing is said.
         journal: Where its journal is; empty where nothing is said.
+        home: The computer where alone it is changed; empty where nothing is said.
         proof: Of the cell files that were right as a whole when this was kept; empty for none.
         expected: What they say that a look has to heed; ``None`` where they were not right.
         doubt: What is wrong with the cell files, or with this; empty for nothing.
@@ -64,6 +65,7 @@ class Reach:
     expected: Expected | None = None
     doubt: str = ""
     journal: str = ""
+    home: str = ""
 
 
 def reach_cell(name: str) -> Reach:
@@ -74,7 +76,7 @@ def reach_cell(name: str) -> Reach:
     """
     doubts: list[str] = []
     said: dict[str, object] = {}
-    of_all = ""
+    of_all: dict[str, str] = {}
     for file in config_files():
         if not file.present:
             continue
@@ -91,17 +93,18 @@ def reach_cell(name: str) -> Reach:
             for key in ("password_file", "journal"):
                 if isinstance(hinted := table.get(key), str):
                     table[key] = whole_place(hinted, file.path)
-            if not of_all and isinstance(hinted := document.get("journal"), str):
-                of_all = whole_place(hinted, file.path)
+            of_all = _of_all(document, file.path) | of_all
         said = table | said
         if isinstance(table.get("url"), str):
             # Files with lower priority may refer to the robot at another address (``load_cells``).
+            of_all = _of_farther(file.path) | of_all
             return Reach(
                 url=str(said["url"]),
                 password_file=_text(said, "password_file"),
                 password_env=_text(said, "password_env"),
                 doubt=" ".join(doubts),
-                journal=_text(said, "journal") or of_all or _journal_of_farther(file.path),
+                journal=_text(said, "journal") or of_all.get("journal", ""),
+                home=_text(said, "home") or of_all.get("home", ""),
             )
     raise ConfigError(
         listed(tr("No address is known for the cell {name!r}:", name=name), doubts)
@@ -113,14 +116,24 @@ def reach_cell(name: str) -> Reach:
     )
 
 
-def _journal_of_farther(after: Path) -> str:
-    """Return what files with lower priority say of all journals; what is unreadable is ignored."""
+def _of_all(document: dict[str, object], path: Path) -> dict[str, str]:
+    """Return where a file says that all cells have their journal and their home."""
+    said = {key: one for key in ("journal", "home") if isinstance(one := document.get(key), str)}
+    return said | ({"journal": whole_place(said["journal"], path)} if "journal" in said else {})
+
+
+def _of_farther(after: Path) -> dict[str, str]:
+    """Return the same of files with lower priority, the nearest first; unreadable ones say nothing.
+
+    Args:
+        after: The file behind which they come.
+    """
     places = [file.path for file in config_files() if file.present]
+    said: dict[str, str] = {}
     for path in places[places.index(after) + 1 :]:
         with suppress(ConfigError):
-            if isinstance(hinted := read_document(path).get("journal"), str):
-                return whole_place(hinted, path)
-    return ""
+            said = _of_all(read_document(path), path) | said
+    return said
 
 
 def glance_at_cell(name: str) -> Reach | None:
@@ -185,6 +198,7 @@ def _recall(name: str, origin: Path) -> Reach | None:
         proof=_text(kept, "proof"),
         expected=_recalled_expected(kept.get("expected")),
         journal=_text(kept, "journal"),
+        home=_text(kept, "home"),
     )
 
 

@@ -226,6 +226,9 @@ def _is_a_journal(text: str) -> str:
 
 JournalPlace = Annotated[Text, AfterValidator(_is_a_journal)]
 
+ComputerName = Annotated[str, Field(pattern=r"^[^\s/\\:@,;]{1,253}$")]
+"""As its system tells it; no address and no URL, which no computer is called."""
+
 EachJoint = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_length=6)]
 
 _LEAST_MM_S2, _HIGHEST_MM_S2 = ACCELERATION_RANGE_MM_S2
@@ -243,6 +246,7 @@ class CellSettings(BaseModel):
         password_file: File whose first line is the password, seen from the cell file.
         password_env: Environment variable that holds the password.
         journal: Where the journal of this cell is: a path, seen from the cell file, or a URL.
+        home: Name of the computer where the journal lies, and where alone the cell is changed.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set in the controller, which cannot be read over
             the wire (docs/reference/epson.md 1.1).
@@ -283,6 +287,7 @@ class CellSettings(BaseModel):
     password_file: Text | None = None
     password_env: Annotated[str, Field(pattern="^ROBOLINK_PASSWORD[A-Z0-9_]*$")] | None = None
     journal: JournalPlace | None = None
+    home: ComputerName | None = None
     timeout_s: Positive | None = None
     remote_timeout_s: Positive | None = None
     remote_timeout_confirmed_by: Annotated[Text | None, Field(validate_default=True)] = None
@@ -385,6 +390,7 @@ class CellFile(BaseModel):
     Attributes:
         language: Of the sentences on screens.
         journal: Where the journal is of cells that name none of their own.
+        home: The home of cells that name none of their own.
         keep_checks_days: For how many days checks of cells are kept on record.
         groups: Names of cells, or patterns over them, by the name of the group.
         cells: The cells by name.
@@ -394,6 +400,7 @@ class CellFile(BaseModel):
 
     language: str = ""
     journal: JournalPlace | None = None
+    home: ComputerName | None = None
     keep_checks_days: Annotated[int, Field(ge=7, le=3650)] | None = None
     groups: dict[str, Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]] = Field(
         default_factory=dict

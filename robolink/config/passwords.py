@@ -1,6 +1,9 @@
 """Where the controller's password comes from. Never from the command line or a URL."""
 
 import os
+import sys
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from robolink.errors import ConfigError
@@ -68,6 +71,8 @@ def from_keyring(identity: str) -> Secret | None:
     Raises:
         ConfigError: The keyring failed in a way of its own, of D-Bus for example.
     """
+    if "keyring" not in sys.modules and not _keyring_is_installed():
+        return None
     try:
         import keyring
         from keyring.errors import KeyringError
@@ -89,6 +94,12 @@ def from_keyring(identity: str) -> Secret | None:
             ),
         ) from error
     return None if value is None else Secret(value)
+
+
+@cache
+def _keyring_is_installed() -> bool:
+    """Whether it is, looked for once: a check of many cells asks for the password of each."""
+    return find_spec("keyring") is not None
 
 
 def _from_file(path: Path) -> Secret:

@@ -287,7 +287,8 @@ class ControllerCore(DriverPart, ABC):
         """End what nobody waited on, leave in order, close. Idempotent."""
         self.latch.await_stops(_STOPS_S)
         try:
-            self._take_leave()
+            if not self.latch.severed:
+                self._take_leave()
         except RobolinkError:
             pass  # the link is closing in any case; markers keep what is in doubt
         except BaseException as error:

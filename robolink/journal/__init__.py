@@ -20,6 +20,13 @@ if TYPE_CHECKING:
     from robolink.journal._connections import nothing_is_open as nothing_is_open
     from robolink.journal._connections import open_journal as open_journal
     from robolink.journal._connections import open_log as open_log
+    from robolink.journal._copies import JournalCopy as JournalCopy
+    from robolink.journal._copies import copy_journals as copy_journals
+    from robolink.journal._homes import CellHome as CellHome
+    from robolink.journal._homes import computer_key as computer_key
+    from robolink.journal._homes import not_at_home as not_at_home
+    from robolink.journal._homes import require_home as require_home
+    from robolink.journal._homes import this_computer as this_computer
     from robolink.journal._journal import Journal as Journal
     from robolink.journal._lease_view import LEASE_S as LEASE_S
     from robolink.journal._lease_view import LeaseHolder as LeaseHolder
@@ -52,6 +59,8 @@ else:
                 "journals_in_use memory_journal names_on_record nothing_is_open open_journal "
                 "open_log"
             ),
+            "_homes": "CellHome computer_key not_at_home require_home this_computer",
+            "_copies": "JournalCopy copy_journals",
             "_journal": "Journal",
             "_lease_view": (
                 "LEASE_S LeaseHolder LeaseView describe_holder signature_here this_process"

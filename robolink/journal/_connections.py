@@ -8,6 +8,7 @@ from weakref import WeakValueDictionary
 
 from robolink.deprecation import deprecated
 from robolink.errors import ConfigError, JournalError
+from robolink.journal._homes import not_at_home, require_home
 from robolink.journal._places import JournalPlace, default_location, memory_place, place_of
 from robolink.journal._read_only_log import ReadOnlyLog
 from robolink.model import OutcomeLog, Signature
@@ -50,7 +51,13 @@ def open_journal(
         (0, True)
         >>> close_files()
     """
-    place = place_of(location or default_location(address))
+    location = location or default_location(address)
+    # Where one is open, its place was looked at: where the shares are mounted is read once, and not
+    # for each cell of many.
+    open_here = _opened.get((location, read_only))
+    if open_here is not None:
+        return open_here
+    place = place_of(location)
     key = (place.url or place.location, read_only)
     with _lock:
         known = _opened.get(key)
@@ -89,8 +96,9 @@ def open_log(
 ) -> OutcomeLog:
     """Return the record of a controller, which may be one that cannot be kept.
 
-    Looking at a controller and calming it needs no record: a journal that cannot be opened
-    raises here nothing, but at the first use that would have to be recorded.
+    Looking at a controller and calming it needs no record: a journal that cannot be opened, or
+    belongs to another computer, raises here nothing, but at the first use that would have to be
+    recorded. So this is where a change is refused anywhere but at the home of its cell.
 
     Args:
         address: How the controller is reached.
@@ -106,17 +114,18 @@ def open_log(
         >>> log.durable, log.trouble
         (False, None)
     """
-    if not durable:
-        return memory_journal(address).log(address, signature=signature)
 
     def record() -> OutcomeLog:
+        require_home(address)
+        if not durable:
+            return memory_journal(address).log(address, signature=signature)
         journal = open_journal(address=address)
         journal.require_usable()  # a journal opened earlier may have been damaged since
         journal.require_unmoved(address)
         return journal.log(address, signature=signature)
 
-    trouble = None
-    if not glance:
+    trouble: JournalError | None = not_at_home(address)
+    if trouble is None and not (durable and glance):
         try:
             return record()
         except JournalError as error:

@@ -62,6 +62,8 @@ class Journal:
             JournalError: It was, and says where; or it cannot be read.
         """
         with self._store.read() as tables:
+            if not tables.has_moves():
+                return  # as in nearly every journal: its names need not be looked up
             move = tables.moved(() if controller is None else tables.names.all_of(controller))
         if move is not None:
             from robolink.journal.store.seal import moved_error, shown

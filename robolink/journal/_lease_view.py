@@ -18,12 +18,15 @@ from typing import Final
 from robolink import runtime
 from robolink.errors import LeaseHeldError
 from robolink.files.durable import make_folder, state_folder
+from robolink.journal._homes import this_computer
 from robolink.messages import tr
 from robolink.model import ClientRun, EntryKind, NewEntry, Signature
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label, wall_label
 
 _DEAD_STATES: Final = ("Z", "X")
+_USER_VARIABLES: Final = ("LOGNAME", "USER", "LNAME", "USERNAME")
+"""Variables that ``getpass`` reads, in its order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,23 +89,31 @@ class BootClock:
 
 def this_process(operator: str = "") -> LeaseHolder:
     """Return this process as the holder of a lease."""
-    import getpass
-    import platform
-
-    try:
-        os_user = getpass.getuser()
-    except (OSError, KeyError, ImportError):
-        os_user = ""  # a container may run under a user number without a name
     pid = os.getpid()
     process_start, boot = _start_and_boot(pid)
     return LeaseHolder(
-        os_user=os_user,
-        host=platform.node(),
+        os_user=_os_user(*map(os.environ.get, _USER_VARIABLES)),
+        host=this_computer(),
         pid=pid,
         process_start=process_start,
         boot=boot,
         operator=operator,
     )
+
+
+@lru_cache(maxsize=1)
+def _os_user(*_said: str | None) -> str:
+    """Return the user by environment or system; the system is not asked for each cell of many.
+
+    Args:
+        _said: What the variables say that go before the system.
+    """
+    import getpass
+
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return ""  # a container may run under a user number without a name
 
 
 @lru_cache(maxsize=1)

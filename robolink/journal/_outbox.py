@@ -4,12 +4,12 @@ The cell's journal is the record, and all that the cell needs. The plant has cop
 witness: they show what nobody at the cell can undo, that a journal was cut, rewritten or replaced.
 """
 
-import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
+from robolink.journal._homes import this_computer
 from robolink.journal._places import without_user
 from robolink.journal._plant import ChainConflictError, ChainEnd, PlantDatabase
 from robolink.journal.store.chain import FIRST, ChainCheck
@@ -275,7 +275,7 @@ def home_of(location: str) -> str:
         location: The journal's URL without its password; that of a server names its computer.
     """
     path = location.removeprefix("sqlite:///")
-    return without_user(location) if path == location else f"{platform.node()}:{path}"
+    return without_user(location) if path == location else f"{this_computer()}:{path}"
 
 
 def _conflict(what: str, end: ChainEnd) -> ChainConflictError:

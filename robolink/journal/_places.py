@@ -14,6 +14,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Final
 
 from robolink.errors import ConfigError, JournalError
+from robolink.journal._homes import CellHome, name_homes
 from robolink.messages import tr
 
 _SQLITE: Final = "sqlite:///"
@@ -66,17 +67,31 @@ _named: dict[str, str] = {}
 empty address the one of everything else."""
 
 
-def name_journals(places: Mapping[str, str], *, afresh: bool = False) -> None:
+def name_journals(
+    places: Mapping[str, str],
+    *,
+    homes: Mapping[str, CellHome] | None = None,
+    afresh: bool = False,
+) -> None:
     """Look for journals where the cell files name them, from now on in this process.
 
-    The environment goes before (:func:`default_location`).
+    The environment goes before (:func:`default_location`); it moves no home.
 
     Args:
         places: URLs or paths of journals, by the address of a controller; under an empty address
             that of everything else. An empty place names none.
+        homes: Homes of the cells, by the same addresses.
         afresh: Whether what was named before is forgotten.
+
+    Example:
+        >>> from robolink.journal import CellHome, name_journals
+        >>> address = "epson+sim://named-example"
+        >>> name_journals({address: "line3.db"}, homes={address: CellHome("line3", "PC7")})
     """
+    name_homes(homes or {}, afresh=afresh)
     global _named  # noqa: PLW0603 - a process has one environment, and one set of cell files
+    if not afresh and places.items() <= _named.items():
+        return  # as each of many cells says when it is connected to
     _named = {} if afresh else dict(_named)
     _named.update(places)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager, suppress
 from typing import TypeVar
 
-from robolink.errors import JournalError
+from robolink.errors import JournalError, NotAtHomeError
 from robolink.journal._lease_view import forget_client, note_client, run_of, this_process
 from robolink.model import (
     ClientRun,
@@ -28,9 +28,10 @@ T = TypeVar("T")
 class ReadOnlyLog:
     """Stands in for a log until something is unfinished or must be recorded.
 
-    It goes on standing in where the journal is full, damaged, newer, locked or out of reach. What
-    is on record shows as far as it can be read then; whatever would have to be recorded raises
-    what is wrong with the journal, so nothing that changes a controller leaves this process.
+    It goes on standing in where the journal is full, damaged, newer, locked, out of reach or on
+    another computer, the home of the cell. What is on record shows as far as it can be read then;
+    whatever would have to be recorded raises what is wrong with the journal, so nothing that
+    changes a controller leaves this process.
 
     Made by :func:`open_log`.
 
@@ -242,7 +243,8 @@ class ReadOnlyLog:
             JournalError: That is impossible, as it was the first time.
         """
         if self._trouble is not None:
-            raise JournalError(self._trouble.what, remedy=self._trouble.remedy) from self._trouble
+            kind = NotAtHomeError if isinstance(self._trouble, NotAtHomeError) else JournalError
+            raise kind(self._trouble.what, remedy=self._trouble.remedy) from self._trouble
         if self._opened is None:
             try:
                 self._opened = self._record()

@@ -136,6 +136,8 @@ class CallbackConversation:
         self._peer = peer
         self._signature = signature or Signature()
         self._controllers, self._cell = tuple(controllers), cell
+        if cell is not None:
+            cell.home.require_here()
         self._tell = tell
         self._log: JournalOutcomeLog | None = None
         self._number = 0

@@ -4,6 +4,12 @@ from typing import TYPE_CHECKING
 
 from robolink.lazy_exports import old_names
 from robolink.transaction._change import ToolChange, Wanted, change_tools
+from robolink.transaction._changed_since import (
+    ChangedSince,
+    changed_since,
+    last_proof,
+    tools_changed_since,
+)
 from robolink.transaction._orders import (
     LONGEST_ORDER,
     Describe,
@@ -11,19 +17,17 @@ from robolink.transaction._orders import (
     Order,
     carrying_out,
     finish_order,
+    order_on_record,
     plain_result,
     require_order_id,
 )
 from robolink.transaction._put_back import PutBack, Step
 from robolink.transaction._settling import Recovery, Settler, look, recover
 from robolink.transaction._undo import (
-    ChangedSince,
     Undone,
     UndoPlan,
-    changed_since,
     earlier_corrections,
     id_of_change,
-    last_proof,
     plan_undo,
     undo,
 )
@@ -50,10 +54,12 @@ __all__ = [
     "id_of_change",
     "last_proof",
     "look",
+    "order_on_record",
     "plain_result",
     "plan_undo",
     "recover",
     "require_order_id",
+    "tools_changed_since",
     "undo",
 ]
 

@@ -144,7 +144,12 @@ def require_order_id(order: str) -> str:
 
 @contextmanager
 def carrying_out(
-    controller: Controller, order: str, job: Mapping[str, object], *, wait_s: float | None = None
+    controller: Controller,
+    order: str,
+    job: Mapping[str, object],
+    *,
+    wait_s: float | None = None,
+    ends: Callable[[BaseException], bool] = lambda _error: True,
 ) -> Iterator[Order]:
     """Keep the lease, look the order up, and record its id with all that is done for it.
 
@@ -160,6 +165,9 @@ def carrying_out(
         order: The id that the line computer gave.
         job: What is ordered, plain JSON. The same order must not come with another job.
         wait_s: How long to wait for other threads and programs, as :class:`ToolChange` does.
+        ends: Whether what ended the block ends the order, too. It does not, and is not on record,
+            where nothing was begun by then, as by a no to the question whether to begin, or where a
+            person decides about each further delivery of an order that met a defect.
 
     Raises:
         BusyError: Another process is changing this controller, or has it and is silent.
@@ -205,7 +213,8 @@ def carrying_out(
         try:
             yield Order(order, plain)
         except (Exception, KeyboardInterrupt) as error:
-            _record_end(controller, order, plain, error)
+            if ends(error):
+                _record_end(controller, order, plain, error)
             raise
         finally:
             outcomes.order = ""
@@ -303,21 +312,9 @@ def _done(
     Raises:
         ConfigError, ToolChangedError: See :func:`carrying_out`.
     """
-    if entry.details.get("job") != job:
-        raise _refused(tr("Order {order} was given before, for another job.", order=order))
-    if isinstance(ended := entry.details.get("ended"), dict):
-        raise as_before(order, entry.at, ended)
-    if entry.details.get("forgotten"):
-        raise _refused(
-            tr("Order {order} was closed without checking how it ended.", order=order),
-        )
-    if _taken_back(controller.outcomes, entry):
-        raise _refused(tr("Order {order} was undone.", order=order))
-    tools, result = entry.details.get("tools"), entry.details.get("result")
-    if not isinstance(tools, dict) or not isinstance(result, dict):
-        raise _refused(
-            tr("Entry {number} of the journal cannot be understood.", number=entry.number)
-        )
+    done = _recorded(controller.outcomes, order, job, entry)
+    tools = entry.details["tools"]
+    assert isinstance(tools, dict)  # noqa: S101 - just looked at
     for number, value in tools.items():
         tool, left = int(number), read_offset(value)
         now = read_for_verdict(controller.tools, tool, (left,))
@@ -335,6 +332,61 @@ def _done(
             )
     _require_selected(controller, order, entry)
     _require_files(order, entry)
+    return done
+
+
+def order_on_record(
+    outcomes: OutcomeLog, order: str, job: Mapping[str, object]
+) -> DoneOrder | None:
+    """Return how an order was carried out, by the record alone; ``None`` where it has no end there.
+
+    The controller is not asked: what it holds now may be another value.
+
+    Args:
+        outcomes: The record of its controller.
+        order: Its id.
+        job: What was ordered, plain JSON.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.transaction import carrying_out, finish_order, order_on_record
+        >>> with robolink.connect("epson+sim://on-record-example") as controller:
+        ...     with carrying_out(controller, "J-1009", {"note": 1}) as order:
+        ...         finish_order(controller, order, {"seen": True})
+        ...     dict(order_on_record(controller.outcomes, "J-1009", {"note": 1}).result)
+        {'seen': True}
+
+    Raises:
+        RobolinkError: It ended without a kept change: an error of the kind that ended it; or it was
+            another job, or was undone, or closed on a person's word, since (``ConfigError``).
+    """
+    entry = _found(outcomes, order)
+    return None if entry is None else _recorded(outcomes, order, job, entry)
+
+
+def _recorded(
+    outcomes: OutcomeLog, order: str, job: Mapping[str, object], entry: Recorded
+) -> DoneOrder:
+    """Return how an order ended, as its entry has it.
+
+    Raises:
+        RobolinkError: See :func:`order_on_record`.
+    """
+    if entry.details.get("job") != job:
+        raise _refused(tr("Order {order} was given before, for another job.", order=order))
+    if isinstance(ended := entry.details.get("ended"), dict):
+        raise as_before(order, entry.at, ended)
+    if entry.details.get("forgotten"):
+        raise _refused(
+            tr("Order {order} was closed without checking how it ended.", order=order),
+        )
+    if _taken_back(outcomes, entry):
+        raise _refused(tr("Order {order} was undone.", order=order))
+    tools, result = entry.details.get("tools"), entry.details.get("result")
+    if not isinstance(tools, dict) or not isinstance(result, dict):
+        raise _refused(
+            tr("Entry {number} of the journal cannot be understood.", number=entry.number)
+        )
     return DoneOrder(entry.change, entry.at, result)
 
 

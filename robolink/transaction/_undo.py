@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from robolink.errors import ConfigError, ToolChangedError
-from robolink.messages import joined, listed, tr
+from robolink.messages import listed, tr
 from robolink.model import (
     PROOFS,
     Controller,
@@ -21,7 +21,6 @@ from robolink.model import (
     Recorded,
     ToolOffset,
     ToolReceipt,
-    describe_offset,
     new_operation,
     read_offset,
     require_engineer,
@@ -29,95 +28,9 @@ from robolink.model import (
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label
 from robolink.transaction._change import Wanted, change_tools
+from robolink.transaction._changed_since import changed_since, last_proof
 from robolink.transaction._orders import Describe, Order, finish_order, plain_result
 from robolink.transaction._put_back import Step
-
-
-@dataclass(frozen=True, slots=True)
-class ChangedSince:
-    """A tool that somebody else changed.
-
-    Attributes:
-        tool: Its number.
-        recorded: What was read back last.
-        at: When, as a label.
-        now: What it holds.
-    """
-
-    tool: int
-    recorded: ToolOffset | None
-    at: str
-    now: ToolOffset | None
-
-    @property
-    def distance_mm(self) -> float | None:
-        """How far the tip was moved, ``None`` where a value is undefined."""
-        if self.recorded is None or self.now is None:
-            return None
-        return math.dist(self.recorded.components()[:3], self.now.components()[:3])
-
-    @property
-    def sentence(self) -> str:
-        """When, by how much, and the usual causes."""
-        return joined(" ", self.findings)
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        """The same, a sentence each."""
-        changed = tr(
-            "Tool {tool} holds {now}; on {at} it was left with {recorded}.",
-            tool=self.tool,
-            now=describe_offset(self.now),
-            at=local_label(self.at),
-            recorded=describe_offset(self.recorded),
-        )
-        distance = self.distance_mm
-        by = tr("That is {distance:.3f} mm away.", distance=distance) if distance else ""
-        causes = tr(
-            "The usual causes: a program that runs TLSet at its start, an edit on the pendant, a "
-            "restored project."
-        )
-        return tuple(part for part in (changed, by, causes) if part)
-
-
-def last_proof(controller: Controller, tool: int) -> Recorded | None:
-    """Return the newest entry with a value read from ``tool`` after a write."""
-    return next(
-        (
-            entry
-            for entry in controller.outcomes.recorded(tool=tool, kinds=PROOFS)
-            if "value" in entry.details
-        ),
-        None,
-    )
-
-
-def changed_since(controller: Controller, tool: int, now: ToolOffset | None) -> ChangedSince | None:
-    """Compare a tool with the last value that this software confirmed in it.
-
-    Args:
-        controller: The controller, connected.
-        tool: Number of the tool.
-        now: What it holds.
-
-    Returns:
-        ``None`` when it agrees, or was never written with this software.
-
-    Example:
-        >>> import robolink
-        >>> from robolink.transaction import changed_since
-        >>> with robolink.connect("epson+sim://since-example") as controller:
-        ...     now = controller.tools.read(1)
-        ...     print(changed_since(controller, 1, now))  # it was never written from here
-        None
-    """
-    last = last_proof(controller, tool)
-    if last is None:
-        return None
-    recorded = read_offset(last.details["value"])
-    if controller.tools.same(recorded, now):
-        return None
-    return ChangedSince(tool, recorded, last.at, now)
 
 
 def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:

@@ -7,8 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+import pytest
+
 from robolink.calibration import CameraModel
+from robolink.calibration_run import Listener
 from robolink.controllers import SoftMotionController
+from robolink.errors import CalibrationError, RobolinkError
 from robolink.model import ToolOffset
 from robolink.stations import CameraStation
 from tests.contract._sensor_cell import TOOL, SensorCell, plc_sensor_cell, sensor_cell
@@ -81,3 +85,29 @@ def cell_of(kind: str, seed: int = 3) -> Iterator[SensorCell]:
     """Set up a cell around a controller of one kind."""
     with KINDS[kind](seed) as cell:
         yield cell
+
+
+def refusal(
+    cell: SensorCell,
+    source: Any,
+    *,
+    error: type[RobolinkError] = CalibrationError,
+    listener: Listener | None = None,
+) -> Any:
+    """Check that a change is refused: old value, tool lifted, and a way on."""
+    before = stored_in(cell)
+    with pytest.raises(error) as raised:
+        if listener is None:
+            run_source(cell, source)
+        else:
+            with cell.connected() as controller:
+                if hasattr(controller, "take"):
+                    controller.take()
+                cell.change(source, listener)(controller)
+    after = stored_in(cell)
+    assert before is not None
+    assert after is not None
+    assert after.rounded(3) == before.rounded(3)
+    assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
+    assert raised.value.remedy
+    return raised.value

@@ -104,3 +104,20 @@ def test_somebody_at_work_is_not_disturbed(line3):
 def test_a_cell_that_is_in_no_file_is_refused(line3):
     with pytest.raises(ConfigError, match="no cell 'line9'"):
         recover_cell("line9")
+
+
+def test_the_command_and_the_call_recover_alike_and_an_open_controller_stays_open(line3):
+    """The command line has connected, and listens, already; each yes is kept by who asked."""
+    _, url = line3
+    marker = interrupted(url, MarkerKind.MOVE, "Go P1", {})
+    told: list[bool] = []
+    with robolink.connect(url) as controller:
+        found = recover_cell(controller, tell=lambda _finding, closed: told.append(closed))
+        assert (found.cell, len(found.left)) == (url, 1)
+        assert recover_cell(controller, later=[marker.operation]).left == ()
+        found = recover_cell(controller, judge=lambda _finding: True, answered_by=None)
+        assert (found.recovered, len(found.settled)) == (True, 1)
+        assert list(holders_of(far_end_of(url))) == []
+        assert controller.status().ready
+    assert told == [False]
+    assert list(open_journal().entries(kinds=(EntryKind.DECISION,))) == []

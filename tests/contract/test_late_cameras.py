@@ -23,7 +23,7 @@ from robolink.methods import (
     RunoutTableSource,
 )
 from robolink.model import TIP
-from tests.contract._camera_cell import camera_station, cell_of, run_source, stored_in
+from tests.contract._camera_cell import camera_station, cell_of, refusal, run_source, stored_in
 from tests.contract._sensor_cell import miss_mm
 from tests.contract.test_spots_that_stand_still import AfterTheWrite, held_board, soaked
 from tests.eye._picture_servers import Time
@@ -126,26 +126,6 @@ def station_of(cell):
 
 def source_with(method, cell, camera):
     return METHODS[method](cell, camera, station_of(cell))
-
-
-def refusal(cell, source, *, error=CalibrationError, listener=None):
-    """Check that a change is refused: old value, tool lifted, and a way on."""
-    before = stored_in(cell)
-    with pytest.raises(error) as raised:
-        if listener is None:
-            run_source(cell, source)
-        else:
-            with cell.connected() as controller:
-                if hasattr(controller, "take"):
-                    controller.take()
-                cell.change(source, listener)(controller)
-    after = stored_in(cell)
-    assert before is not None
-    assert after is not None
-    assert after.rounded(3) == before.rounded(3)
-    assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
-    assert raised.value.remedy
-    return raised.value
 
 
 def cases(*each_time):

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli import main
+from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson import serve_tcp
@@ -18,8 +19,10 @@ from robolink.backup import read_tools
 from robolink.config import add_cell, find_cell
 from robolink.errors import BusyError, ConfigError
 from robolink.inspection import CellCheck, CheckFailure, CheckState, check_cell, check_cells
+from robolink.inspection._cell_checks import CheckSlots, most_aside
 from robolink.journal import ChainConflictError, Journal, LeaseHolder, move_journal, open_journal
 from robolink.journal._lease_view import this_process
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.model import EntryKind, NewEntry, Signature, ToolOffset
 from robolink.stopping import StopListener, holders_of
 from robolink.transport import far_end_of
@@ -107,6 +110,51 @@ def test_cells_that_are_off_keep_no_other_from_being_checked(line, silent):
     (first, second) = [one for one in open_journal().checks() if not one.well]
     assert {first.controller, second.controller} == set(off)
     assert first.details["error"] == "ConnectError"
+
+
+def test_cells_that_are_off_hold_no_place_of_those_that_answer(line, silent):
+    """Of two places the six in front, which never answer, would have both for nine seconds."""
+    order: list[str] = []
+    checks = check_cells(
+        [*[silent] * 6, *cells(line)],
+        at_once=2,
+        connect=lambda cell: robolink.connect(cell if isinstance(cell, str) else cell.url),
+        progress=lambda check: order.append(check.cell),
+    )
+    assert sorted(order[:4]) == sorted(line)
+    assert [check.state for check in checks] == [FAILED] * 6 + [WELL] * 4
+    assert {why(check).kind for check in checks[:6]} == {"ConnectError"}
+
+
+def test_only_a_connection_that_is_long_in_coming_makes_room_for_another_cell():
+    clock = ManualClock()
+    slots = CheckSlots(2, 14, clock)
+    assert [slots.take() for _ in range(3)] == [True, True, False]
+    with slots.aside():
+        assert not slots.take()  # it is there in a moment, as a rule
+        clock.advance(0.11)
+        assert slots.take()
+        assert not slots.take()
+    slots.leave()
+    assert not slots.take()  # who was connected late is let in, and counts
+    slots.leave()
+    assert slots.take()
+
+
+@pytest.mark.parametrize(("files", "most"), [(1024, 512), (256, 128), (64, 64), (-1, 512)], ids=str)
+def test_no_more_cells_are_waited_for_than_the_process_has_files(monkeypatch, files, most):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda _which: (files, resource.RLIM_INFINITY))
+    monkeypatch.setattr(resource, "RLIM_INFINITY", -1)
+    clock = ManualClock()
+    slots = CheckSlots(64, most_aside(64), clock)
+    with ExitStack() as stack:
+        begun = 0
+        while begun < 1000 and slots.take():
+            stack.enter_context(slots.aside())
+            clock.advance(0.11)
+            begun += 1
+    assert begun == most
 
 
 def test_a_cell_whose_lease_somebody_has_is_busy_and_is_not_connected_to(line):
@@ -244,6 +292,27 @@ def test_a_journal_that_cannot_be_used_fails_each_check_by_name(line, monkeypatc
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(tmp_path))
     checks = check_cells(cells(line))
     assert {why(check).kind for check in checks} == {"JournalError"}
+
+
+def test_the_record_is_read_once_for_a_cell_and_not_for_each_of_its_tools(line, monkeypatch):
+    """With a query for each tool it was three quarters of what a check cost."""
+    chosen = cells(line)
+    with robolink.connect(chosen[0].url) as controller:
+        controller.tools.write(2, ToolOffset(5, 6, -70), expected=None)
+    line["press-1"].machine.tools.set(2, ToolOffset(5, 6, -71))
+    check_cells(chosen)
+    asked, rows = [], DatabaseConnection.rows
+
+    def counted(connection, statement, *values):
+        asked.append(statement)
+        return rows(connection, statement, *values)
+
+    monkeypatch.setattr(DatabaseConnection, "rows", counted)
+    checks = check_cells(chosen)
+    assert checks[0].inspection is not None
+    assert [one.subject for one in checks[0].inspection.findings] == ["2"]
+    assert len([one for one in asked if "FROM entries WHERE" in one]) <= 3 * len(chosen)
+    assert len(asked) <= 32 * len(chosen)
 
 
 def test_a_name_that_is_no_cell_is_refused_before_any_is_asked(line):

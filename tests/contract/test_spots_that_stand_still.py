@@ -23,7 +23,13 @@ from robolink.methods import (
 )
 from robolink.model import EntryKind
 from robolink.procedures import LookPlan
-from tests.contract._camera_cell import camera_station, cell_of, furnish, run_source, stored_in
+from tests.contract._camera_cell import (
+    camera_station,
+    cell_of,
+    furnish,
+    refusal,
+    run_source,
+)
 from tests.contract._sensor_cell import TOOL, miss_mm
 from tests.contract.test_proof_after_a_break import Later
 
@@ -66,26 +72,6 @@ class AfterTheWrite(Listener):
     def wrote(self, receipt):
         assert receipt.tool == TOOL
         furnish(self._cell, **self._faults)
-
-
-def refusal(cell, source, *, error=CalibrationError, listener=None):
-    """Check a refusal: the old value is stored, the tip is lifted."""
-    before = stored_in(cell)
-    with pytest.raises(error) as raised:
-        if listener is None:
-            run_source(cell, source)
-        else:
-            with cell.connected() as controller:
-                if hasattr(controller, "take"):
-                    controller.take()
-                cell.change(source, listener)(controller)
-    after = stored_in(cell)
-    assert before is not None
-    assert after is not None
-    assert after.rounded(3) == before.rounded(3)
-    assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
-    assert raised.value.remedy
-    return raised.value
 
 
 @pytest.mark.parametrize(

@@ -200,6 +200,9 @@ GLANCE_S: Final = 1.0
 """Longest wait of a read for another program, in s; after that the journal is opened for writing,
 which reports the problem."""
 
+ANSWER_S: Final = 20.0
+"""Longest silence of a server to which short questions are asked, in s."""
+
 _AGAIN_S: Final = 0.01
 """Pause before a new file is asked again for its write-ahead log, in s."""
 
@@ -223,6 +226,13 @@ _NOTICED: Final = {
 }
 """Connection options that detect a server behind a cut network after :data:`BUSY_S`, even during a
 transaction (docs/reference/faults.md F78); the system's default is two hours."""
+
+_ENDED: Final = """
+    SET idle_in_transaction_session_timeout = '10s'; SET tcp_keepalives_idle = 5;
+    SET tcp_keepalives_interval = 2; SET tcp_keepalives_count = 3; SET tcp_user_timeout = '10s'
+"""
+"""Of a prompt connection: lets the server end one whose program is frozen in a transaction, or
+whose computer is cut off. Its locks would hold up every other computer until then."""
 
 _SERVER: Final = r"""
     (?:(?P<user>[^:/]*)(?::(?P<password>[^@]*))?@)?
@@ -252,7 +262,9 @@ class Backend:
     dispose: Callable[[], None] = lambda: None
 
 
-def backend_of(place: JournalPlace, *, read_only: bool, glance: bool = False) -> Backend:
+def backend_of(
+    place: JournalPlace, *, read_only: bool, glance: bool = False, prompt: bool = False
+) -> Backend:
     """Return the database at ``place``; no file and no server is opened yet.
 
     Args:
@@ -260,13 +272,15 @@ def backend_of(place: JournalPlace, *, read_only: bool, glance: bool = False) ->
         read_only: Whether nothing is written.
         glance: Whether that is for one short question: see
             :class:`~robolink.journal.store.store.Store`.
+        prompt: Whether all questions are short, so that a server has to answer them:
+            see :func:`prompt_connection`.
 
     Raises:
         OSError: The file or its folder cannot be made.
         JournalError: A driver is missing, or the file to read is.
     """
     if place.url:
-        return _postgresql(place, read_only=read_only)
+        return _postgresql(place, read_only=read_only, prompt=prompt)
     if place.path is None:
         memory = _connect("file::memory:")
         return Backend(lambda: DatabaseConnection(memory, lasting=True), dispose=memory.close)
@@ -352,7 +366,7 @@ def _make_file(path: Path) -> None:
     sync_folder(path.parent)
 
 
-def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
+def _postgresql(place: JournalPlace, *, read_only: bool, prompt: bool) -> Backend:
     try:
         import psycopg
     except ImportError as error:
@@ -366,7 +380,8 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
     where = server_parameters(place.url)
 
     def connect() -> DatabaseConnection:
-        connection = PostgresqlConnection(psycopg.connect(**where))
+        driver = prompt_connection(where) if prompt else psycopg.connect(**where)
+        connection = PostgresqlConnection(driver)
         try:
             for setting in settings:
                 connection.run(setting)
@@ -377,6 +392,56 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
         return connection
 
     return Backend(connect, failures=(psycopg.Error,))
+
+
+def prompt_connection(parameters: Mapping[str, Any]) -> Any:  # noqa: ANN401 - of psycopg
+    """Connect to a server that fails with ``OperationalError`` when it is silent for ANSWER_S.
+
+    The server ends the connection in turn when this end is silent in a transaction, or cut off.
+
+    One that is frozen, with the machine that it runs on or by a snapshot of it, keeps its
+    connections: the system at the far end goes on to acknowledge what is sent, so no time-out of
+    the network ends a question. psycopg before 3.2 does not wake up meanwhile, and waits.
+
+    Args:
+        parameters: Of libpq.
+    """
+    connection = _prompt_class().connect(**parameters)
+    try:
+        connection.execute(_ENDED)
+        connection.commit()
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+@lru_cache(maxsize=1)
+def _prompt_class() -> Any:  # noqa: ANN401 - of psycopg
+    import psycopg
+
+    class PromptConnection(psycopg.Connection[Any]):
+        """Gives up a server that is silent."""
+
+        def wait(self, gen: Any, *how: Any, **more: Any) -> Any:  # noqa: ANN401 - as psycopg has it
+            return super().wait(self._answered(gen), *how, **more)
+
+        def _answered(self, gen: Any) -> Any:  # noqa: ANN401 - as psycopg has it
+            deadline = Deadline.after(SystemClock(), ANSWER_S)
+            try:
+                wanted = next(gen)
+                while True:
+                    ready = yield wanted
+                    if ready:
+                        deadline = Deadline.after(SystemClock(), ANSWER_S)
+                    elif deadline.expired:
+                        self.pgconn.finish()
+                        raise psycopg.OperationalError(f"no answer for {ANSWER_S:g} s")
+                    wanted = gen.send(ready)
+            except StopIteration as end:
+                return end.value
+
+    return PromptConnection
 
 
 def server_parameters(url: str) -> dict[str, Any]:

@@ -122,9 +122,11 @@ class Tables:
         Args:
             names: Of the controller; none for the journal as a whole.
         """
-        if not self.connection.rows(self.connection.has_moves):
-            return None
-        return move_of(moves_in(self.connection), names)
+        return move_of(moves_in(self.connection), names) if self.has_moves() else None
+
+    def has_moves(self) -> bool:
+        """Whether anything was moved into this journal or out of it."""
+        return bool(self.connection.rows(self.connection.has_moves))
 
     def damage(self, names: tuple[str, ...]) -> Iterator[str]:
         """Yield damage in what a change of a controller would rely on, in sentences.

@@ -19,9 +19,10 @@ from robolink_cli.session.plant_outbox import (
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
-from robolink.config import NamedPlant, check_file, named_plant
+from robolink.config import NamedPlant, add_cell, check_file, named_plant
 from robolink.journal import (
     close_files,
+    copy_journals,
     default_location,
     journals_added_to,
     move_journal,
@@ -200,16 +201,19 @@ def test_sync_shows_the_chain_what_was_copied_and_what_is_left(run, plant):
     assert code == 0
     assert found == {
         "schema": "robolink/journal-synced/1",
+        "ok": True,
         "plant": plant,
         "named_by": "ROBOLINK_PLANT",
         "journals": [
             {
                 "journal": default_location(),
+                "cells": [],
                 "chain": hashes[0],
                 "copied_count": 3,
                 "number": 3,
                 "hash": hashes[2],
                 "behind_count": 0,
+                "error": None,
             }
         ],
     }
@@ -217,6 +221,55 @@ def test_sync_shows_the_chain_what_was_copied_and_what_is_left(run, plant):
     assert code == 0
     assert hashes[0][:12] in out
     assert "ROBOLINK_PLANT" in out
+
+
+def test_sync_copies_the_journals_of_many_cells_each_once_and_names_those_it_cannot(
+    run, plant, tmp_path, monkeypatch
+):
+    """One journal is missing, one was rewritten; two cells share one; the others are copied."""
+    own = {name: tmp_path / f"{name}.db" for name in ("press-1", "press-2", "press-3", "glue")}
+    file = tmp_path / "robolink.toml"
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(file))
+    monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
+    monkeypatch.delenv("ROBOLINK_STATE_DIR", raising=False)
+    journals = {**own, "press-4": own["press-1"]}
+    for number, (name, journal) in enumerate(sorted(journals.items())):
+        said = {"url": f"epson+tcp://192.0.2.{number + 1}:5000", "journal": str(journal)}
+        add_cell(file, name, said)
+    for name, journal in own.items():
+        if name != "press-2":
+            entries = open_journal(str(journal))
+            for _ in range(2):
+                entries.log(f"epson:{name}").append(NewEntry(EntryKind.DECISION, verdict=name))
+    assert run("journal", "sync", "press-3")[0] == 0
+    act(open_journal(str(own["press-3"])), "DELETE FROM entries WHERE number = 2")
+    close_files()
+    code, document = told(run("journal", "sync", "press-*", "glue", "press-1", "--json"))
+    assert (code, document["ok"]) == (2, False)
+    found = {tuple(one["cells"]): one for one in document["journals"]}
+    assert list(found) == [("press-1", "press-4"), ("press-2",), ("press-3",), ("glue",)]
+    assert [one["number"] for one in found.values()] == [2, None, None, 2]
+    kinds = {cells: one["error"] and one["error"]["kind"] for cells, one in found.items()}
+    assert kinds[("press-2",)] == "JournalError"
+    assert kinds[("press-3",)] == "ChainConflictError"
+    assert [kinds[("press-1", "press-4")], kinds[("glue",)]] == [None, None]
+    code, out, _ = run("journal", "sync", "press-*")
+    assert code == 2
+    assert "press-2: not copied." in out
+    assert "There is no journal" in out
+    assert run("journal", "sync", "press-*", "--new-chain")[0] == 2
+    assert run("journal", "sync", "press-1", "glue")[0] == 0
+    assert run("journal", "sync", "press-9")[0] == 2
+
+
+def test_where_the_plant_is_away_no_further_journal_is_tried(tmp_path):
+    places = [str(tmp_path / f"{number}.db") for number in range(20)]
+    for place in places:
+        open_journal(place).log("epson:C-1").append(NewEntry(EntryKind.DECISION))
+    close_files()
+    copies = list(copy_journals(places, "postgresql://u@127.0.0.1:1/plant", at_once=1))
+    assert {type(one.error).__name__ for one in copies} == {"ConnectError"}
+    assert len({id(one.error) for one in copies}) == 1
 
 
 def test_sync_says_who_is_missing(run, monkeypatch):

@@ -2,15 +2,15 @@
 
 Nothing moves, nothing is written to a controller, and no lease is taken. A cell at which somebody
 works is left alone: an EPSON controller serves one client, so the record and the processes of this
-computer are asked first. Each cell has one deadline for everything, and many are waited for at the
-same time, so that cells that are off cost the others nothing.
+computer are asked first. Each cell has one deadline for everything. Many are worked at at the same
+time, and those that do not connect hold no other up: cells that are off cost the others nothing.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from queue import Empty, SimpleQueue
-from threading import Event
+from threading import Event, Lock
 from typing import Final
 
 from robolink.backup import ToolState, read_tools
@@ -36,17 +36,27 @@ from robolink.inspection._inspection import Inspection, inspect
 from robolink.journal import (
     name_journals,
     open_journal,
+    require_home,
     signature_here,
 )
 from robolink.messages import tr
 from robolink.model import Controller, Signature
 from robolink.stopping import SharedStopListener, holders_of
-from robolink.timing import NS_PER_S, Deadline, SystemClock
+from robolink.timing import NS_PER_S, Clock, Deadline, SystemClock
 from robolink.transport import far_end_of
+from robolink.transport.tcp import aside_while_dialling
 from robolink.version import VERSION
 
 AT_ONCE: Final = 64
-"""Number of cells that are waited for at the same time."""
+"""Number of cells that are worked at at the same time; those whose connection is long in coming are
+not counted."""
+
+_ASIDE: Final = 7
+"""So many times as many are waited for until they can be connected to: with those that are worked
+at, half of the 1,024 files that Linux gives a process. Where it gives fewer, fewer are."""
+
+_LONG_S: Final = 0.1
+"""From so long on a connection is waited for, in s; a controller that is on takes 1 ms."""
 
 DEADLINE_S: Final = 10.0
 """Longest time for one cell, in s; connecting to one that is off ends after its time-out."""
@@ -114,7 +124,8 @@ def check_cells(
 ) -> tuple[CellCheck, ...]:
     """Check cells, many at once, and record each check outside the chain of the journal.
 
-    What keeps one cell from being checked is in its result, and ends nothing else. Ctrl-C lets
+    What keeps one cell from being checked is in its result, and ends nothing else; that its home is
+    another computer, too: the record that it is compared with is there. Ctrl-C lets
     the checks under way log out; those that were finished are on record.
 
     Args:
@@ -126,7 +137,8 @@ def check_cells(
         signature: Who checks; by default the user of this computer.
         keep_days: For how many days checks are kept, as ``load_cell_files().keep_checks_days``
             says; by default none is deleted.
-        at_once: How many cells are waited for at the same time.
+        at_once: How many cells are worked at at the same time. One that does not connect at once
+            is not counted, so that cells that are off cost the others nothing.
         deadline_s: Longest time for one cell.
         progress: Called in this thread with each check that has ended.
         tell: Receives sentences about a cell that a person should know once.
@@ -144,9 +156,11 @@ def check_cells(
         ['well', 'well', 'well']
     """
     places = [place_of(number, cell) for number, cell in enumerate(cells)]
-    for place in places:
-        if isinstance(place.cell, Cell):
-            name_journals({place.address: place.cell.settings.journal or ""})
+    of = {place.address: place.cell for place in places if isinstance(place.cell, Cell)}
+    name_journals(
+        {address: cell.settings.journal or "" for address, cell in of.items()},
+        homes={address: cell.home for address, cell in of.items()},
+    )
     with ExitStack() as stack:
         listener = _listener(places, tell)
         if listener is not None:
@@ -173,22 +187,8 @@ def _listener(
     """Return what hears a stop from another terminal; ``None`` where it cannot, or need not."""
     if not any(not place.inside for place in places):
         return None
-    who = signature_here(VERSION)
-    try:
-        return SharedStopListener(
-            who=tr("{who} (a check of cells)", who=who.os_user or "?"),
-            heard=lambda url, by: tell(
-                tr("{url}: stopped from another terminal by {who}.", url=url, who=by)
-            ),
-        )
-    except OSError as error:
-        tell(
-            tr(
-                "'robolink stop' in another terminal cannot reach this command: {cause}.",
-                cause=error.strerror or error,
-            )
-        )
-        return None
+    who = tr("{who} (a check of cells)", who=signature_here(VERSION).os_user or "?")
+    return SharedStopListener.telling(tell, who=who)
 
 
 class _Looker:
@@ -227,6 +227,7 @@ class _Looker:
         self, place: CheckPlace, deadline: Deadline, found: list[Inspection], met: list[Met]
     ) -> None:
         self._require_time(deadline)
+        require_home(place.address)  # elsewhere there is no record to compare the tools with
         if not place.inside:
             _require_nobody(place)
         try:
@@ -300,6 +301,68 @@ def _busy(who: str) -> BusyError:
     return BusyError(who, remedy=tr("Nothing was sent. Check the cell again later."))
 
 
+class CheckSlots:
+    """How many cells are worked at; one that waits long for its connection holds no slot.
+
+    Args:
+        most: How many may be worked at at the same time.
+        aside: How many more may be waited for.
+        clock: The clock.
+    """
+
+    def __init__(self, most: int, aside: int, clock: Clock) -> None:
+        self._most, self._aside, self._clock = most, aside, clock
+        self._lock = Lock()
+        self._taken = 0
+        self._dialled: dict[object, Deadline] = {}
+
+    def take(self) -> bool:
+        """Take a slot for a cell; false where none is free, or too many cells are waited for."""
+        with self._lock:
+            aside = sum(one.expired for one in self._dialled.values())
+            free = self._taken < self._most + min(aside, self._aside)
+            self._taken += free
+            return free
+
+    def leave(self) -> None:
+        """Give a slot back."""
+        with self._lock:
+            self._taken -= 1
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Hold no slot in the block from :data:`_LONG_S` on; behind it there is one too many.
+
+        It is let in all the same: whoever is connected to an EPSON controller keeps others out.
+        """
+        key = object()
+        with self._lock:
+            self._dialled[key] = Deadline.after(self._clock, _LONG_S)
+        try:
+            yield
+        finally:
+            with self._lock:
+                del self._dialled[key]
+
+
+def most_aside(most: int) -> int:
+    """Return how many cells may be waited for beside those that are worked at.
+
+    Each has an open file, and of those that this process may have a half is left to all else.
+
+    Args:
+        most: How many may be worked at at the same time.
+    """
+    try:
+        import resource  # not on Windows, where sockets are no files
+    except ImportError:
+        return most * _ASIDE
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if files == resource.RLIM_INFINITY:
+        return most * _ASIDE
+    return max(0, min(most * _ASIDE, files // 2 - most))
+
+
 def _together(looker: _Looker, places: Sequence[CheckPlace], together: int) -> Iterator[EndedCheck]:
     """Yield checks as they end, so many at once; whoever leaves early waits for those under way.
 
@@ -309,22 +372,30 @@ def _together(looker: _Looker, places: Sequence[CheckPlace], together: int) -> I
     ended: SimpleQueue[tuple[int, EndedCheck | BaseException]] = SimpleQueue()
     begun: dict[int, Deadline] = {}
     longest_s = looker.deadline_s + 2 * _TICK_S
+    aside = most_aside(together)
+    slots = CheckSlots(together, aside, SystemClock())
 
     def work(number: int) -> None:
         begun[number] = Deadline.after(SystemClock(), longest_s)
+        found: EndedCheck | BaseException
         try:
-            ended.put((number, looker.check(places[number])))
+            with aside_while_dialling(slots.aside):
+                found = looker.check(places[number])
         except BaseException as error:
-            ended.put((number, error))
+            found = error
+        slots.leave()
+        ended.put((number, found))
 
-    pool = ThreadPoolExecutor(together, thread_name_prefix="robolink-check")
-    left = set(range(len(places)))
+    pool = ThreadPoolExecutor(together + aside, thread_name_prefix="robolink-check")
+    left, waiting = set(range(len(places))), iter(range(len(places)))
+    following = next(waiting, None)
     try:
-        for number in left:
-            pool.submit(work, number)
         while left:
+            while following is not None and slots.take():
+                pool.submit(work, following)
+                following = next(waiting, None)
             try:
-                number, found = ended.get(timeout=_TICK_S)
+                number, found = ended.get(timeout=_TICK_S if following is None else _LONG_S)
             except Empty:
                 late = [one for one in left if one in begun and begun[one].expired]
                 for one in late:

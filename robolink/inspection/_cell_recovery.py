@@ -1,7 +1,7 @@
 """Recovery of a cell as one call: connect, finish or undo what was interrupted, log out."""
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -48,10 +48,13 @@ class CellRecovery:
 
 
 def recover_cell(
-    cell: Cell | str,
+    cell: Cell | str | Controller,
     *,
     keep: bool = False,
     judge: Callable[[Finding], bool] | None = None,
+    answered_by: AnsweredBy | None = AnsweredBy.PROGRAM,
+    tell: Callable[[Finding, bool], None] = lambda _finding, _settled: None,
+    later: Collection[str] = (),
     connect: Callable[[Cell | str], Controller] | None = None,
     signature: Signature | None = None,
     wait_s: float = 0.0,
@@ -62,11 +65,14 @@ def recover_cell(
     reaches the cell meanwhile.
 
     Args:
-        cell: The cell, its name, or the URL of a controller.
+        cell: The cell, its name, the URL of a controller, or a controller that is open already: it
+            stays so, and whoever opened it lets a stop reach it.
         keep: Whether new values that nobody tested stay; else the old ones are restored.
         judge: Asked about each finding that reading cannot settle: true only where somebody has
-            looked at the robot, and work may go on. Each yes is on record as a program's answer.
-            By default such a finding is left.
+            looked at the robot, and work may go on. By default such a finding is left.
+        answered_by: As whose answer each yes goes on record; ``None`` where ``judge`` keeps it.
+        tell: Told of each finding, and whether it is settled.
+        later: Operations of markers that are left alone: the caller settles them.
         connect: How the cell is connected to; by default as its file says, and a URL as it is.
         signature: Who recovers; by default the user of this computer.
         wait_s: How long to wait for somebody else who has the controller.
@@ -85,34 +91,50 @@ def recover_cell(
     """
     clock = SystemClock()
     begun_ns = clock.now_ns()
-    controller = (connect or _connecting(signature, wait_s))(cell)
-    name = cell if isinstance(cell, str) else cell.name
-    selected: int | None = None
+    with ExitStack() as stack:
+        controller = (
+            stack.enter_context(_opened(cell, connect or _connecting(signature, wait_s)))
+            if isinstance(cell, (Cell, str))
+            else cell
+        )
+
+        def confirm(finding: Finding) -> bool:
+            if judge is None or not judge(finding):
+                return False
+            if answered_by is not None:
+                _keep_yes(controller, finding, answered_by)
+            return True
+
+        found = recover(controller, keep=keep, confirm=confirm, tell=tell, later=later)
+        selected: int | None = None
+        with suppress(ControllerError):  # a controller without an answer has no selected tool
+            selected = controller.tools.selected()
+    called = cell.name if isinstance(cell, Cell) else controller.identity
+    name = cell if isinstance(cell, str) else called
+    seconds = (clock.now_ns() - begun_ns) / NS_PER_S
+    return CellRecovery(name, found.settled, found.left, selected, seconds)
+
+
+@contextmanager
+def _opened(cell: Cell | str, connect: Callable[[Cell | str], Controller]) -> Iterator[Controller]:
+    """Connect to a cell for the block, and let a stop from another terminal reach it."""
+    controller = connect(cell)
     with controller, controller.latch.ending(tr("recover")), ExitStack() as stack:
         url = controller.identity
         if "+sim://" not in url:
             who = tr("{who} (recover)", who=controller.outcomes.signature.os_user or "?")
             identity = controller.outcomes.identity
             stack.enter_context(StopListener(controller, url, who=who, name=identity))
+        yield controller
 
-        def confirm(finding: Finding) -> bool:
-            if judge is None or not judge(finding):
-                return False
-            question = tr("Is that right, and can work continue?")
-            answer = answer_entry(f"{finding.sentence} {question}", True, AnsweredBy.PROGRAM)
-            if finding.marker.kind is MarkerKind.HISTORY:
-                controller.outcomes.answered(answer)  # stored where the new record begins
-            else:
-                controller.outcomes.append(answer)
-            return True
 
-        found = recover(controller, keep=keep, confirm=confirm)
-        try:
-            selected = controller.tools.selected()
-        except ControllerError:
-            selected = None
-    seconds = (clock.now_ns() - begun_ns) / NS_PER_S
-    return CellRecovery(name, found.settled, found.left, selected, seconds)
+def _keep_yes(controller: Controller, finding: Finding, by: AnsweredBy) -> None:
+    question = tr("Is that right, and can work continue?")
+    answer = answer_entry(f"{finding.sentence} {question}", True, by)
+    if finding.marker.kind is MarkerKind.HISTORY:
+        controller.outcomes.answered(answer)  # stored where the new record begins
+    else:
+        controller.outcomes.append(answer)
 
 
 def _connecting(signature: Signature | None, wait_s: float) -> Callable[[Cell | str], Controller]:

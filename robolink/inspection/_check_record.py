@@ -12,6 +12,7 @@ from robolink.journal import (
     Journal,
     default_location,
     memory_journal,
+    not_at_home,
     open_journal,
     signature_here,
 )
@@ -31,14 +32,11 @@ class CheckPlace(NamedTuple):
     cell: Cell | str
     name: str
     url: str
+    address: str
 
     @property
     def called(self) -> str:
         return self.name or self.url
-
-    @property
-    def address(self) -> str:
-        return parse_url(self.url).address
 
     @property
     def inside(self) -> bool:
@@ -49,9 +47,9 @@ class CheckPlace(NamedTuple):
 def place_of(number: int, cell: Cell | str) -> CheckPlace:
     if isinstance(cell, str):
         if "://" in cell:
-            return CheckPlace(number, cell, "", cell)
+            return CheckPlace(number, cell, "", cell, parse_url(cell).address)
         cell = find_cell(cell)
-    return CheckPlace(number, cell, cell.name, cell.url)
+    return CheckPlace(number, cell, cell.name, cell.url, parse_url(cell.url).address)
 
 
 class Met(NamedTuple):
@@ -122,6 +120,8 @@ class Recorder:
         waiting, self._waiting = self._waiting, []
         groups: dict[tuple[str, str], list[EndedCheck]] = {}
         for one in waiting:
+            if not_at_home(one.place.address):
+                continue  # it was not checked, and its record is on another computer
             memory = one.met.memory if one.met else ""
             kept = "" if memory else default_location(one.place.address)
             groups.setdefault((memory, kept), []).append(one)

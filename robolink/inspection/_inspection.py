@@ -1,8 +1,9 @@
 """Compares a cell with its record: is it as the last change left it, is anything due."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Final
 
 from robolink.backup import ToolState
 from robolink.calibration_run import RecipeRun
@@ -12,15 +13,19 @@ from robolink.errors import CalibrationError, NotReadyError
 from robolink.messages import tr
 from robolink.methods import all_methods
 from robolink.model import (
+    PROOFS,
     Controller,
     ControllerStatus,
     EntryKind,
+    Recorded,
     ToolOffset,
     begun_in_words,
 )
 from robolink.stations import find_stations
 from robolink.timing import local_label
-from robolink.transaction import changed_since
+from robolink.transaction import tools_changed_since
+
+_READ: Final = tuple(dict.fromkeys((*KINDS, *PROOFS, EntryKind.STATION)))
 
 
 class InspectionCode(StrEnum):
@@ -127,12 +132,15 @@ def inspect(
         >>> found.findings
         ()
     """
-    outcomes = controller.outcomes
-    stations = find_stations(cell, outcomes.recorded(kinds=(EntryKind.STATION,)))
-    newest_first = list(outcomes.recorded(kinds=KINDS))
+    # Read once: of each kind, or of each tool, the queries cost more than the check itself.
+    newest_first = list(controller.outcomes.recorded(kinds=_READ))
+    stations = find_stations(cell, _of_kinds((EntryKind.STATION,), newest_first))
     finding = {method.name for method in all_methods() if method.needs.finds_pin}
     course = drift_of(
-        controller.identity, reversed(newest_first), finds_pin=finding.__contains__, since=since
+        controller.identity,
+        reversed(_of_kinds(KINDS, newest_first)),
+        finds_pin=finding.__contains__,
+        since=since,
     )
     read = {} if isinstance(tools, NotReadyError) else dict(tools.tools)
     selected = None if isinstance(tools, NotReadyError) else tools.selected
@@ -140,7 +148,12 @@ def inspect(
         *_in_error(controller.status()),
         *_unsettled(controller),
         *(_not_read(tools) if isinstance(tools, NotReadyError) else ()),
-        *_changed(controller, read),
+        *(
+            InspectionFinding(
+                InspectionCode.TOOL_CHANGED, str(one.tool), one.sentence, _put_back(one.tool)
+            )
+            for one in tools_changed_since(controller, read, newest_first)
+        ),
         *(
             InspectionFinding(InspectionCode.STATION_DUE, name, station.remark())
             for name, station in stations.items()
@@ -154,6 +167,10 @@ def inspect(
     return Inspection(
         controller.identity, read, selected, tuple(stations), len(course.changes), findings
     )
+
+
+def _of_kinds(kinds: Collection[EntryKind], entries: Iterable[Recorded]) -> list[Recorded]:
+    return [entry for entry in entries if entry.kind in kinds]
 
 
 def _in_error(status: ControllerStatus) -> Iterator[InspectionFinding]:
@@ -191,17 +208,6 @@ def _unsettled(controller: Controller) -> Iterator[InspectionFinding]:
             ),
             tr("Next: robolink recover"),
         )
-
-
-def _changed(
-    controller: Controller, tools: Mapping[int, ToolOffset | None]
-) -> Iterator[InspectionFinding]:
-    for number, value in tools.items():
-        change = changed_since(controller, number, value)
-        if change is not None:
-            yield InspectionFinding(
-                InspectionCode.TOOL_CHANGED, str(number), change.sentence, _put_back(number)
-            )
 
 
 def _put_back(tool: int) -> str:

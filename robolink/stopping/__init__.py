@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from robolink.stopping._ending import may_be_ended as may_be_ended
     from robolink.stopping._listener import SharedStopListener as SharedStopListener
     from robolink.stopping._listener import StopListener as StopListener
+    from robolink.stopping._listener import no_place_to_listen as no_place_to_listen
     from robolink.stopping._notes import StopNote as StopNote
     from robolink.stopping._notes import clear_note as clear_note
     from robolink.stopping._notes import find_note as find_note
@@ -29,7 +30,7 @@ else:
         {
             "_asking": "ControllerHolder HolderGoneError LastSeen await_brief_holders holders_of",
             "_ending": "end_process may_be_ended",
-            "_listener": "SharedStopListener StopListener",
+            "_listener": "SharedStopListener StopListener no_place_to_listen",
             "_notes": "StopNote clear_note find_note leave_note",
         },
         old_names(__name__),

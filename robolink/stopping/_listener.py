@@ -22,13 +22,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final, Protocol, Self
 
 from robolink import runtime
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
 from robolink.interrupts import ClosedAtExit
 from robolink.journal import this_process
+from robolink.messages import tr
 from robolink.model import ControllerStatus, is_own_name
 from robolink.plug_ins import unexpected
 from robolink.timing import NS_PER_S, wall_label
@@ -177,6 +178,25 @@ class SharedStopListener(ClosedAtExit):
         path = _path_of(_new_token()).with_suffix(".sock")
         self._server = _LocalServer(path, self._answers, "robolink-stop", apart=True)
 
+    @classmethod
+    def telling(cls, tell: Callable[[str], None], *, who: str) -> Self | None:
+        """Return one that tells of each stop; ``None`` where there is no place to listen.
+
+        Args:
+            tell: Receives the sentences: who stopped what, or that no stop can reach this process.
+            who: Who holds the controllers, and for what, as a person is told.
+        """
+        try:
+            return cls(
+                who=who,
+                heard=lambda url, by: tell(
+                    tr("{url}: stopped from another terminal by {who}.", url=url, who=by)
+                ),
+            )
+        except OSError as error:
+            tell(no_place_to_listen(error))
+            return None
+
     def close(self) -> None:
         """Stop listening. Idempotent."""
         self._server.close()
@@ -214,6 +234,14 @@ class SharedStopListener(ClosedAtExit):
         finally:
             card.unlink(missing_ok=True)
             del self._answers[token]
+
+
+def no_place_to_listen(error: OSError) -> str:
+    """Return what a person is told where no listener can be."""
+    return tr(
+        "'robolink stop' in another terminal cannot reach this command: {cause}.",
+        cause=error.strerror or error,
+    )
 
 
 def _new_token() -> str:

@@ -27,7 +27,9 @@ import os
 import select
 import socket
 import struct
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from ipaddress import ip_address
 from typing import Final
 
@@ -107,6 +109,30 @@ def require_tcp_url(url: LinkUrl) -> tuple[str, int]:
     return url.host, url.port
 
 
+class _Here(threading.local):
+    """What this thread does while it waits for a connection."""
+
+    aside: Callable[[], AbstractContextManager[object]] = nullcontext
+
+
+_here = _Here()
+
+
+@contextmanager
+def aside_while_dialling(aside: Callable[[], AbstractContextManager[object]]) -> Iterator[None]:
+    """Within the block, let this thread stand aside while it waits for a TCP connection.
+
+    Args:
+        aside: Makes what is entered before each such wait, and left after it. So whoever lets only
+            so many threads work lets others in for those that wait for a machine that is off.
+    """
+    outer, _here.aside = _here.aside, aside
+    try:
+        yield
+    finally:
+        _here.aside = outer
+
+
 def dial(url: LinkUrl, *, timeout_s: float, deadline: Deadline) -> socket.socket:
     """Connect to the host and port of ``url``, trying each address the host name has.
 
@@ -120,15 +146,16 @@ def dial(url: LinkUrl, *, timeout_s: float, deadline: Deadline) -> socket.socket
     host, port = require_tcp_url(url)
     failure: OSError = TimeoutError()
     try:
-        for family, kind, number, _, address in socket.getaddrinfo(
-            _as_looked_up(host), port, type=socket.SOCK_STREAM
-        ):
-            if deadline.expired:
-                break
-            try:
-                return _connect(socket.socket(family, kind, number), address, deadline)
-            except OSError as error:
-                failure = error
+        with _here.aside():
+            for family, kind, number, _, address in socket.getaddrinfo(
+                _as_looked_up(host), port, type=socket.SOCK_STREAM
+            ):
+                if deadline.expired:
+                    break
+                try:
+                    return _connect(socket.socket(family, kind, number), address, deadline)
+                except OSError as error:
+                    failure = error
     except (socket.gaierror, UnicodeError) as error:
         raise ConnectError(
             tr("The host name {host!r} is not known.", host=host),

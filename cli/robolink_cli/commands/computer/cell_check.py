@@ -183,11 +183,10 @@ def _connected(context: CliContext, stack: ExitStack) -> Controller:
     url = context.require_url()
     signature = signature_of(context.operator, context.expected, changes=False)
     trace = stack.enter_context(recording(context.record, url.partition("?")[0]))
-    password = password_of(context)
     if context.cell is None:
         return robolink.connect(
             url,
-            password=password,
+            password=password_of(context),
             timeout_s=context.timeout_s,
             wait_s=context.wait_s,
             trace=trace,
@@ -195,7 +194,8 @@ def _connected(context: CliContext, stack: ExitStack) -> Controller:
         )
     return connect_cell(
         context.cell,
-        password=password,
+        # Else it is found where the cell's file says.
+        password=password_of(context) if context.password_file else None,
         timeout_s=context.timeout_s,
         wait_s=context.wait_s,
         trace=trace,

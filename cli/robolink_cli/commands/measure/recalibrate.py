@@ -151,8 +151,9 @@ def recalibrate(
     refusal, Ctrl-C or an emergency stop the old values and the selected tool stay. Without RECIPE,
     on a terminal, you choose cell and recipe from lists.
     """
-    from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
+    from robolink_cli.commands.measure.recalibration import Recalibration, RunOptions
     from robolink_cli.commands.measure.recipe_choice import nobody_to_ask
+    from robolink_cli.commands.measure.run_events import EventStream
     from robolink_cli.console.person import may_be_guided
     from robolink_cli.console.render import note
     from robolink_cli.session.context import guided_if_alone

@@ -1,28 +1,22 @@
 """One run of a recipe from the command line: events for a script, headings for a person."""
 
-import json
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-
-import click
+from typing import Protocol
 
 from robolink.backup import keep_first_backup
-from robolink.calibration import VerifyResult
-from robolink.calibration_run import ChangeReport, Listener, Moment, Proposal, RecipeRun, preview
-from robolink.errors import CalibrationError, DeclinedError
+from robolink.calibration_run import ChangeReport, RecipeRun, preview
+from robolink.errors import DeclinedError
 from robolink.messages import joined, tr
-from robolink.model import AnsweredBy, Controller, ToolReceipt, json_fields
-from robolink.procedures import MeasurementContext
+from robolink.model import AnsweredBy, Controller, json_fields
 from robolink.recipe import Answers, LoadedRecipe, require_answers
-from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
 from robolink.timing import NS_PER_S
 from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
-from robolink_cli.console.exit_codes import error_body, exit_code
-from robolink_cli.console.output import drawn_elsewhere, hand_over
+from robolink_cli.commands.measure.run_events import EventStream, Progress
 from robolink_cli.console.person import person_here
-from robolink_cli.console.render import emit, note, say, switch_json_on
+from robolink_cli.console.render import emit, note, say
 from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.questions import asked, keep_answer
@@ -31,133 +25,21 @@ from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.order import ordered, show_done, with_order
-from robolink_cli.views.documents import (
-    pose_payload,
-    proposal_payload,
-    receipt_payload,
-    verification_payload,
-)
 from robolink_cli.views.fit import report_payload, show_report, steps_payload
 
 
-class EventStream:
-    """Writes one JSON line for each event, if requested.
+class OrderGate(Protocol):
+    """Whose turn an ordered run is, asked once a person has agreed to it."""
 
-    Args:
-        context: Click's, so that text for people goes to stderr.
-        on: Whether it is wanted.
-    """
+    def carrying_out(self, controller: Controller) -> AbstractContextManager[Order]:
+        """Keep the lease, and look the order up."""
 
-    def __init__(self, context: click.Context, *, on: bool) -> None:
-        self.on = on
-        if on:
-            switch_json_on(context)
+    def begin(self) -> None:
+        """Begin; nothing was moved or written before.
 
-    def emit(self, event: str, **payload: object) -> None:
-        """Write one event."""
-        if self.on:
-            line = {"schema": "robolink/recalibration-event/1", "event": event, **payload}
-            hand_over(json.dumps(line, allow_nan=False))
-
-    @contextmanager
-    def closing(self) -> Iterator[None]:
-        """End the stream with ``error`` when the block does; ``result`` is the block's own."""
-        try:
-            yield
-        except (Exception, KeyboardInterrupt) as error:
-            self.emit("error", error=error_body(error), exit_code=exit_code(error))
-            raise
-
-
-class Progress(Listener):
-    """Reports the events to a person and a script.
-
-    Attributes:
-        tool: Number of the tool at work.
-
-    Args:
-        events: The stream of a script.
-        tools: How many tools the recipe has.
-    """
-
-    def __init__(self, events: EventStream, tools: int) -> None:
-        self._events, self._tools = events, tools
-        self.tool = 0
-
-    def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
-        """Show which phase begins."""
-        if tool is not None:
-            self.tool = tool
-        if not drawn_elsewhere():
-            heading = _heading(moment, self.tool)
-        elif self._tools > 1 and moment is Moment.BEFORE_MEASURE:
-            heading = tr("Measuring tool {tool}.", tool=self.tool)
-        else:
-            heading = ""  # the screen has a heading
-        if heading:
-            note(heading)
-        self._events.emit("phase", phase=moment, tool=tool)
-
-    def step(self, tool: int, done: StepDone) -> None:
-        """Report one step."""
-        self.tool = tool
-        kind, text = _in_words(done.step)
-        pose = pose_payload(done.pose) if done.pose else None
-        self._events.emit("step", tool=tool, kind=kind, text=text, pose=pose)
-
-    def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
-        """Report a measurement that is not believed."""
-        if again:
-            note(tr("Tool {tool}: {error} Measuring it again.", tool=tool, error=error))
-        self._events.emit(
-            "refused", tool=tool, code=error.code, what=error.what, remedy=error.remedy, again=again
-        )
-
-    def proposed(self, proposals: Sequence[Proposal]) -> None:
-        """Show the measured value next to the stored one."""
-        from robolink_cli.views.fit import show_proposal
-
-        for proposal in proposals:
-            show_proposal(proposal)
-            self._events.emit("proposal", **proposal_payload(proposal))
-
-    def wrote(self, receipt: ToolReceipt) -> None:
-        """Report a write."""
-        from robolink_cli.views.fit import tell_written
-
-        tell_written(receipt)
-        self.tool = receipt.tool
-        self._events.emit("write", **receipt_payload(receipt))
-
-    def verified(self, tool: int, result: VerifyResult) -> None:
-        """Report a turn test."""
-        self._events.emit("verification", tool=tool, **(verification_payload(result) or {}))
-
-    def told(self, sentence: str) -> None:
-        """Pass on a message to the person."""
-        self._events.emit("note", text=sentence)
-
-
-def _in_words(step: TakenStep) -> tuple[str, str]:
-    """Return what kind of step it is, and what it says."""
-    match step:
-        case Ask():
-            return "touch", step.instruction
-        case Notify():
-            return "remark", step.text
-        case Confirm():
-            return "offer", step.question
-        case _:
-            return "move", step.purpose
-
-
-def _heading(moment: Moment, tool: int) -> str:
-    """Return the heading of what comes next, empty for none."""
-    if moment is Moment.BEFORE_MEASURE:
-        return tr("-- tool {tool}: measure", tool=tool)
-    if moment is Moment.BEFORE_WRITE:
-        return tr("-- propose and write")
-    return tr("-- done") if moment is Moment.END else ""
+        Raises:
+            RobolinkError: It is not its turn any more.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +54,7 @@ class RunOptions:
         sensor: The camera, in place of the recipe's.
         order: Id of the line computer's order; ``None`` without one.
         dry_run: Whether the run is only shown.
+        gate: Asked whether the run may begin, where its order comes from a plan.
     """
 
     answers: Answers
@@ -181,6 +64,7 @@ class RunOptions:
     sensor: str | None = None
     order: str | None = None
     dry_run: bool = False
+    gate: OrderGate | None = None
 
     @property
     def alone(self) -> bool:
@@ -205,10 +89,22 @@ class Recalibration:
     events: EventStream
 
     def run(self) -> None:
-        """Carry the recipe out, or only show it.
+        """Carry the recipe out, or only show it, and give the result.
 
         Raises:
             RobolinkError: It ended early; the old values are in force, or it says which are not.
+        """
+        payload = self.carry_out()
+        self.events.emit("result", **payload)
+        dry_run = self.options.dry_run
+        if not self.events.on:
+            emit("recalibration", payload, lambda: _show_plan(payload) if dry_run else None)
+
+    def carry_out(self) -> dict[str, object]:
+        """Carry the recipe out, or only show it; return the document of the result.
+
+        Raises:
+            RobolinkError: As :meth:`run`.
         """
         dry_run = self.options.dry_run
         if not dry_run and self.options.alone:
@@ -223,11 +119,10 @@ class Recalibration:
                         document = self._plan(controller, run)
                     else:
                         self._consent(controller, run)
+                        if self.options.gate is not None:
+                            self.options.gate.begin()
                         document = self._carried_out(controller, run, order)
-        payload = with_order(document, order)
-        self.events.emit("result", **payload)
-        if not self.events.on:
-            emit("recalibration", payload, lambda: _show_plan(payload) if dry_run else None)
+        return with_order(document, order)
 
     @contextmanager
     def _opened(self) -> Iterator[tuple[Controller, Order | None]]:
@@ -239,7 +134,9 @@ class Recalibration:
                 changes=not self.options.dry_run,
                 usual_change_mm=loaded.recipe.tolerances.jump_mm,
             ) as controller,
-            ordered(
+            self.options.gate.carrying_out(controller)
+            if self.options.gate is not None
+            else ordered(
                 controller,
                 self.options.order,
                 "change",

@@ -1,6 +1,6 @@
 """recover: the one way to finish or undo an interrupted job."""
 
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import click
 
@@ -26,6 +26,9 @@ from robolink_cli.session.context import (
 from robolink_cli.session.take_over import end_holder
 from robolink_cli.views.documents import finding_payload
 from robolink_cli.wizard.state import ChoiceSubject, choose
+
+if TYPE_CHECKING:
+    from robolink.inspection import CellRecovery
 
 OLD: Final = "old"
 NEW: Final = "new"
@@ -190,6 +193,7 @@ def recover(
                 by=AnsweredBy.YES if yes else AnsweredBy.OPTION if choose else None,
                 tests=word == NEW and not dry_run and _somebody_there(),
             )
+            done: Recovery | CellRecovery
             if word == BLOCKED:
                 done, forgotten = guide.left_blocked(declined=choose is None), 0
             else:
@@ -231,7 +235,9 @@ def _somebody_there() -> bool:
     return current_desk() is not None or (bool(person_here()) and not json_is_on())
 
 
-def _gone_through(guide: Guide, *, forget: bool, yes: bool, dry_run: bool) -> tuple[Recovery, int]:
+def _gone_through(
+    guide: Guide, *, forget: bool, yes: bool, dry_run: bool
+) -> "tuple[Recovery | CellRecovery, int]":
     """Return what was found and done, and how many markers were removed."""
     if forget:
         return Recovery((), ()), guide.forget(yes=yes, dry_run=dry_run)

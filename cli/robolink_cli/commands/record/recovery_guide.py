@@ -9,7 +9,7 @@ from robolink.messages import declared, spoken, tr
 from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Pose, begun_in_words
 from robolink.stations import StationKind
 from robolink.timing import local_label
-from robolink.transaction import Recovery, Settler, look, recover
+from robolink.transaction import Recovery, Settler, look
 from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on, note, say
 from robolink_cli.prompts.operator import operator_at
@@ -20,6 +20,7 @@ from robolink_cli.views.documents import finding_payload, pose_payload
 if TYPE_CHECKING:
     from robolink.calibration import VerifyResult
     from robolink.calibration_run import OpenTurnTest
+    from robolink.inspection import CellRecovery
 
 DECLINED: Final = 9
 LEFT: Final = 6
@@ -57,7 +58,7 @@ class Guide:
         self._where: Pose | None = None
         self.declined = False
 
-    def run(self) -> Recovery:
+    def run(self) -> "Recovery | CellRecovery":
         """Recover what can be recovered; a turn test comes last, when nothing else is open.
 
         Raises:
@@ -82,11 +83,14 @@ class Guide:
         for sentence in untested_sentences(self._controller):
             note(sentence)
 
-    def _settled(self, *, later: Collection[str] = ()) -> Recovery:
-        done = recover(
+    def _settled(self, *, later: Collection[str] = ()) -> "CellRecovery":
+        from robolink.inspection import recover_cell
+
+        done = recover_cell(
             self._controller,
             keep=self._keep,
-            confirm=self._confirmed,
+            judge=self._confirmed,
+            answered_by=None,  # each question that is asked keeps its answer
             tell=self._ended,
             later=later,
         )
@@ -133,19 +137,21 @@ class Guide:
                     settler.forget(marker)
         return len(markers)
 
-    def payload(self, done: Recovery) -> dict[str, object]:
+    def payload(self, done: "Recovery | CellRecovery") -> dict[str, object]:
         """Return the document; a controller without an answer has no selected tool."""
-        selected: int | None = None
-        with suppress(ControllerError):
-            selected = self._controller.tools.selected()
         return {
             "settled": [finding_payload(finding) for finding in done.settled],
             "left": [finding_payload(finding) for finding in done.left],
-            "selected_tool": selected,
+            "selected_tool": self._selected() if isinstance(done, Recovery) else done.selected_tool,
             "pose": None if self._where is None else pose_payload(self._where),
         }
 
-    def exit_code(self, done: Recovery) -> int:
+    def _selected(self) -> int | None:
+        with suppress(ControllerError):
+            return self._controller.tools.selected()
+        return None
+
+    def exit_code(self, done: "Recovery | CellRecovery") -> int:
         """Return the exit code: 0, or why something is still open."""
         if not done.left:
             return 0

@@ -1,28 +1,34 @@
-"""The agent of a plant: hands out the jobs whose turn it is, and records what became of each.
+"""The agent of a home: hands out the jobs whose turn it is, and records what became of each.
 
 It decides nothing about a job. Whose turn it is says the store, of which
 :meth:`~robolink.fleet.FleetStore.begin` is asked once more before each delivery; how an end counts
 says its table of outcomes; what waits, runs and is begun again after a kill is the engine's work.
 So an agent that is killed anywhere loses nothing: a job is on record as begun before it is carried
 out, its outcome before it counts as ended, and what is delivered again has the same order.
+
+A plant has an agent at each home, which carries out the jobs of the cells at home there. They know
+nothing of each other: rings, halts and how many cells are at work are counted by the store.
 """
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Collection
+from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
 from datetime import datetime
 from typing import Final, TypeVar
 
 from robolink import runtime
-from robolink.fleet.agent_lock import AgentLock
+from robolink.errors import ConfigError, LeaseHeldError
+from robolink.fleet.agent_lock import AgentLock, agent_name, own_name
 from robolink.fleet.engine import Engine, JobEndedError
-from robolink.fleet.errors import PlanError, PlantError
+from robolink.fleet.errors import PlanError, PlantError, PlantVersionError
 from robolink.fleet.outcome_codes import pause_s
 from robolink.fleet.plans import Plan
 from robolink.fleet.progress import CellJob, JobOutcome, Permit, PlanProgress
+from robolink.fleet.silence import LOOK_S, CellLine, SilentJobs
 from robolink.fleet.states import JobState, PlanKind, WaitReason
 from robolink.fleet.store.store import FleetStore
 from robolink.fleet.watchdog import notify
 from robolink.journal._places import place_of
+from robolink.messages import tr
 from robolink.timing import wall_time
 
 __all__ = ["Act", "Agent", "UNATTENDED"]
@@ -56,14 +62,25 @@ T = TypeVar("T")
 
 
 class Agent:
-    """Carries out the plans of one plant until it is ended.
+    """Carries out the plans of one plant at the cells of this computer until it is ended.
+
+    Attributes:
+        turned_s: When it had its last turn at which the plant's database answered, seconds since
+            1970; 0 before the first.
 
     Args:
         location: The plant's database: path of a file, or URL of PostgreSQL.
         plant: Id of the plant.
         act: Carries out one job.
+        line: The connections of the jobs to their cells, where ``act`` has any.
+        cells: Returns the names of this computer's cells; all that plans name unless given.
+        meanwhile: Entered while the agent holds its lock: what one process of a home alone may do.
         tell: Receives sentences for people.
         clock: Returns the time, with its zone.
+
+    Attributes:
+        home: Name of this computer.
+        hung: Orders of jobs that hung when it had ended: their threads end with the process.
 
     Example:
         >>> from robolink.fleet import FleetStore, JobOutcome, plan_of
@@ -84,18 +101,28 @@ class Agent:
         plant: str,
         act: Act,
         *,
+        line: CellLine | None = None,
+        cells: Callable[[], Collection[str]] | None = None,
+        meanwhile: Callable[[], AbstractContextManager[None]] = nullcontext,
         tell: Callable[[str], None] = lambda _sentence: None,
         clock: Callable[[], datetime] = wall_time,
     ) -> None:
         self._plant, self._act, self._tell, self._clock = plant, act, tell, clock
+        self._cells = cells
         self._store = FleetStore(location, clock=clock)
-        self._lock = AgentLock(location, plant)
+        self.home = self._store.home
+        self._lock = AgentLock(location, plant, self.home)
         self._ending = False  # no lock: it is set where a signal comes
         self._held: set[str] = set()
+        self._silent, self._meanwhile = SilentJobs(line), meanwhile
+        self.hung: frozenset[str] = frozenset()
         self._looked_s = -_LOOK_S
         self._trouble = ""
+        self.turned_s = 0.0
         place = place_of(location)
+        self._shared = bool(place.url)
         self._jobs_url = place.url or f"sqlite:///{place.path}.jobs"
+        self._executor = agent_name(plant, self.home) if place.url else plant
 
     def end(self) -> None:
         """Have it end: no job begins any more, and those that run come to their end.
@@ -108,8 +135,9 @@ class Agent:
         """Carry out what there is to do until :meth:`end`.
 
         Raises:
-            LeaseHeldError: Another agent of this plant lives.
+            LeaseHeldError: Another agent of this plant lives at this home.
             PlantError: The plant's database cannot be used, at the start.
+            PlantVersionError: Its tables are those of another version of robolink.
         """
         self._run(lambda _still: False)
 
@@ -125,21 +153,27 @@ class Agent:
         with ExitStack() as stack:
             stack.enter_context(self._lock)
             stack.enter_context(self._store)
-            engine = Engine(self._jobs_url, self._plant, self._carry_out, workers=WORKERS)
+            stack.enter_context(self._meanwhile())
+            engine = Engine(self._jobs_url, self._executor, self._carry_out, workers=WORKERS)
             engine.start()
+            stack.callback(runtime.regularly(LOOK_S, self._silent.look, "silent jobs"))
             stack.callback(self._stop, engine)
             notify("READY=1")
             while not self._ending:
                 notify("WATCHDOG=1")
-                if enough(self._turn(engine)):
-                    return
+                if enough(self._turn(engine)) or len(self._silent.given_up()) == WORKERS:
+                    return  # if all its workers hang, a new process is of more use
                 engine.wait_for_news(_TURN_S)
                 runtime.sleep(_GATHER_S)
 
     def _stop(self, engine: Engine) -> None:
         notify("STOPPING=1")
         self._ending = True
-        engine.stop(END_S)
+        self.hung = engine.stop(END_S, self._silent.given_up)
+        with suppress(
+            PlantError
+        ):  # what is not recorded now shows when the order is delivered again
+            self._record_cut()
 
     # ---- One turn
 
@@ -149,19 +183,25 @@ class Agent:
         try:
             self._keep_lock()
             self._compare(engine)
+            self._record_cut()
             for plan in self._store.open_plans(self._plant):
                 try:
                     progress = self._store.progress(plan)
                     if not progress.facts.window_open and any(map(_is_tried, progress.jobs)):
                         progress = self._store.end_vain(plan)
-                except PlanError as error:  # it was changed in the database: the others go on
+                    self._require_cells(progress)
+                except PlanError as error:  # of this plan alone: the others go on
                     troubles.append(str(error))
                     continue
                 if progress.plan.kind in UNATTENDED:
                     still = self._advance(engine, progress) and still
+        except PlantVersionError:
+            raise  # its tables have another meaning now: nothing more may begin here
         except PlantError as error:
             still = False
             troubles.append(str(error))
+        else:
+            self.turned_s = runtime.wall_s()
         self._say("\n".join(troubles))
         return still
 
@@ -170,14 +210,68 @@ class Agent:
 
         Raises:
             LeaseHeldError: Another agent was faster.
+            PlantError: The server has not noticed yet that the connection was lost.
         """
-        if not self._lock.is_held():
+        if self._lock.is_held():
+            return
+        try:
             self._lock.take()
+        except LeaseHeldError as held:
+            if held.holder != own_name():
+                raise
+            raise PlantError(
+                tr("The server still keeps this agent's lock for a connection that was lost."),
+                remedy=tr("It ends that within seconds, and the agent goes on. Check the network."),
+            ) from held
+
+    def _require_cells(self, progress: PlanProgress) -> None:
+        """Refuse a plan that belongs to no computer yet, and has cells that this one has not.
+
+        Who begins the first job carries out all of them.
+
+        Raises:
+            PlanError: It has, or a cell file is wrong.
+        """
+        plan = progress.plan
+        if not self._shared or plan.homes or progress.bound_to or plan.kind not in UNATTENDED:
+            return
+        try:
+            missing = [] if self._cells is None else sorted({*plan.cells} - {*self._cells()})
+        except ConfigError as error:
+            raise PlanError(error.what, remedy=error.remedy) from error
+        if missing:
+            raise PlanError(
+                tr(
+                    "Plan {plan} waits for a computer that has all of its cells; this one has no "
+                    "{cells}.",
+                    plan=plan.id,
+                    cells=", ".join(missing[:3]),
+                ),
+                remedy=tr("Name the home of each cell in the cell files, then make the plan anew."),
+            )
+
+    def _record_cut(self) -> None:
+        """Record how jobs ended that were cut off, and name their cells.
+
+        Raises:
+            PlantError: The plant's database cannot be used.
+        """
+        for order, job in self._silent.cut().items():
+            if job.recorded or job.outcome is None:
+                continue
+            plan, _, cell = order.partition("/")
+            ended = self._store.record_outcome(plan, cell, job.attempt, job.outcome)
+            job.recorded = True
+            if not ended.repeated:
+                self._tell(tr("{cell}: {what}", cell=cell, what=job.outcome.what))
 
     def _compare(self, engine: Engine) -> None:
+        """Give a sign of life, and see what the engine holds; every ten seconds."""
         now_s = runtime.monotonic_ns() / 1e9
         if now_s - self._looked_s < _LOOK_S:
             return
+        if self.home:
+            self._store.hear_home(self._plant)
         engine.drop_stranded()
         self._held = set(engine.held())
         self._looked_s = now_s
@@ -185,6 +279,7 @@ class Agent:
     def _advance(self, engine: Engine, progress: PlanProgress) -> bool:
         """Hand out the due jobs of a plan; return whether nothing of it runs or will be due."""
         held = {order for order in self._held.copy() if order.startswith(f"{progress.plan.id}/")}
+        held -= self._silent.given_up()
         if progress.facts.halt is not None:
             # What was begun goes on, and is looked up where it was lost: all that is unsettled
             # shows at once.
@@ -199,7 +294,20 @@ class Agent:
         self._held |= due.keys()
         handed = engine.hand_out(due) if due else ()
         self._held -= due.keys() - set(handed)
-        return not (held or due or later)
+        return not (held or due or later or self._waits_for_others(progress))
+
+    def _waits_for_others(self, progress: PlanProgress) -> bool:
+        """Whether jobs of this home wait for those of homes whose agents are at work."""
+        facts = progress.facts
+        if not facts.may_write:
+            return False
+        waits = others = False
+        for job in progress.jobs:
+            if progress.is_at_home(job.cell, self.home):
+                waits = waits or progress.why(job) in (WaitReason.RING, WaitReason.BUDGET)
+            elif job.ring == facts.ring and not job.state.final:
+                others = others or job.cell not in facts.away
+        return waits and others
 
     def _due(self, progress: PlanProgress, held: int) -> tuple[dict[str, str], bool]:
         """Return the jobs of a plan to hand out, their cells by their orders, and what is later.
@@ -214,8 +322,11 @@ class Agent:
         most = progress.facts.most
         room = len(progress.jobs) if most >= WORKERS else max(0, most - held)
         lost, turns, later = dict[str, str](), list[CellJob](), False
+        hanging = self._silent.given_up()
         for job in progress.jobs:
-            if job.order in self._held:
+            if job.order in self._held or job.order in hanging:
+                continue
+            if not progress.is_at_home(job.cell, self.home):
                 continue
             why = progress.why(job)
             if job.state is JobState.RUNNING:
@@ -254,15 +365,19 @@ class Agent:
             turn = self._insist(lambda: self._store.begin(plan_id, cell))
             if not turn.begun:
                 raise JobEndedError(str(turn.why or turn.job.state))
+            attempt = turn.job.attempt
             plan = self._insist(lambda: self._store.plan(plan_id))
             permit = None
             if turn.may_write:
                 permit = self._insist(lambda: self._store.permit_for(plan))
             if turn.may_write or plan.needs_permit:
-                outcome = self._act(plan, cell, permit)
+                writes = not plan.kind.reads
+                with self._silent.watching(order, attempt, writes=writes) as watched:
+                    outcome = watched.ended(self._act(plan, cell, permit))
+                if watched.recorded and outcome is watched.outcome:
+                    raise JobEndedError(outcome.what)  # a person may have resumed the plan since
             else:
                 outcome = JobOutcome(5, "BusyError", what="The plan may not begin anything now.")
-            attempt = turn.job.attempt
             ended = self._insist(
                 lambda: self._store.record_outcome(plan_id, cell, attempt, outcome)
             )

@@ -1,8 +1,8 @@
-"""One agent a plant: the lock that it holds while it lives, and who holds it.
+"""One agent a plant and home: the lock that it holds while it lives, and who holds it.
 
 On a server it is an advisory lock of a connection of its own, which the server releases when the
-agent's process is gone. Beside a file it is a transaction in a second file, which ends with the
-process too.
+agent's process is gone. Beside a file, which only one computer uses, it is a transaction in a
+second file, which ends with the process too.
 """
 
 import json
@@ -16,14 +16,14 @@ from typing import Final, Self
 from robolink.errors import LeaseHeldError
 from robolink.files.durable import make_folder, write_whole
 from robolink.fleet.errors import PlantError
-from robolink.journal import LeaseHolder, this_process
+from robolink.journal import LeaseHolder, computer_key, this_process
 from robolink.journal._lease_view import describe_holder
 from robolink.journal._places import JournalPlace, place_of
 from robolink.journal.store.connection import backend_of
 from robolink.journal.store.failures import cause_of
 from robolink.messages import listed, tr
 
-__all__ = ["AgentLock"]
+__all__ = ["AgentLock", "agent_name", "own_name"]
 
 _CLASS: Final = 0x666C6565
 """The first half of the number of each advisory lock: no other part of robolink takes it."""
@@ -38,15 +38,32 @@ _HOLDER_OF: Final = """
 """
 
 
+def agent_name(plant: str, home: str) -> str:
+    """Return what the agent of a plant at a home is called where several computers meet.
+
+    Args:
+        plant: Id of the plant.
+        home: Name of the computer; empty where it has none.
+    """
+    return f"{plant}@{computer_key(home)}" if home else plant
+
+
+def own_name() -> str:
+    """Return how a refusal names this process at a server."""
+    here = this_process()
+    return f"{here.os_user}@{here.host} {here.pid}"[:_LONGEST_NAME]
+
+
 class AgentLock:
-    """The lock of one plant's agent; a context manager that holds it.
+    """The lock of a plant's agent at one home; a context manager that holds it.
 
     Args:
         location: The plant's database: path of a file, or URL of PostgreSQL.
         plant: Id of the plant.
+        home: Name of the computer.
 
     Raises:
-        LeaseHeldError: Another agent of this plant lives; it is named.
+        LeaseHeldError: Another agent of this plant lives at this home; it is named.
         PlantError: The database cannot be used.
 
     Example:
@@ -56,9 +73,9 @@ class AgentLock:
         True
     """
 
-    def __init__(self, location: str, plant: str) -> None:
+    def __init__(self, location: str, plant: str, home: str = "") -> None:
         self._place = place_of(location)
-        self._plant = plant
+        self._plant, self._home = plant, home
         self._held: _ServerLock | _FileLock | None = None
 
     def __enter__(self) -> Self:
@@ -77,7 +94,7 @@ class AgentLock:
         """
         self.release()
         if self._place.path is None:
-            lock: _ServerLock | _FileLock = _ServerLock(self._place, self._plant)
+            lock: _ServerLock | _FileLock = _ServerLock(self._place, self._plant, self._home)
         else:
             lock = _FileLock(self._place.path, self._plant)
         self._held = lock
@@ -133,10 +150,11 @@ class _FileLock:
 class _ServerLock:
     """A lock that a server keeps as long as a connection lives."""
 
-    def __init__(self, place: JournalPlace, plant: str) -> None:
+    def __init__(self, place: JournalPlace, plant: str, home: str) -> None:
         self._plant = plant
-        self._number = int.from_bytes(sha256(plant.encode()).digest()[:4]) >> 1
-        backend = backend_of(place, read_only=False)
+        name = agent_name(plant, home)
+        self._number = int.from_bytes(sha256(name.encode()).digest()[:4]) >> 1
+        backend = backend_of(place, read_only=False, prompt=True)
         self._failures = backend.failures
         try:
             self._connection = backend.connect()
@@ -152,9 +170,8 @@ class _ServerLock:
             raise
 
     def _take(self) -> None:
-        here = this_process()
-        said = f"{here.os_user}@{here.host} {here.pid}"[:_LONGEST_NAME]
-        self._connection.rows("SELECT set_config('application_name', :said, false)", {"said": said})
+        said = {"said": own_name()}
+        self._connection.rows("SELECT set_config('application_name', :said, false)", said)
         lock = {"class": _CLASS, "plant": self._number}
         ((taken,),) = self._connection.rows("SELECT pg_try_advisory_lock(:class, :plant)", lock)
         if not taken:

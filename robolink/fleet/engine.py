@@ -10,6 +10,7 @@ After a kill a job is begun again, which its order makes harmless (``transaction
 """
 
 import logging
+import math
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -29,7 +30,7 @@ from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from robolink import runtime
 from robolink.fleet.errors import PlantError
-from robolink.journal.store.connection import parameters_of
+from robolink.journal.store.connection import prompt_connection, server_parameters
 from robolink.messages import listed, tr
 
 __all__ = ["Engine", "JobEndedError", "QueuePlace"]
@@ -43,8 +44,6 @@ _BESIDES: Final = 8
 """Threads and connections beside those of the workers, for the engine's own looks."""
 
 _LOGGED: Final = ("journal_mode=WAL", "synchronous=NORMAL")
-_NOTICED: Final = {"connect_timeout": 3, "tcp_user_timeout": 3000, "application_name": "robolink"}
-"""How soon a server that does not answer counts as gone (parameters of libpq)."""
 
 
 class QueuePlace(StrEnum):
@@ -78,7 +77,7 @@ class Engine:
 
     Args:
         url: PostgreSQL, or ``sqlite:///`` and the path of a file of the engine's own.
-        plant: Id of the plant, whose lock the caller holds: one engine a plant runs at a time.
+        plant: Name of the agent, whose lock the caller holds: one engine of it runs at a time.
         carry_out: Carries out the job of an order. It returns when the outcome is durable, and
             raises :class:`JobEndedError` for one that is not what the job was for.
         workers: How many jobs run at once.
@@ -155,14 +154,10 @@ class Engine:
             PlantError: The database cannot be used; none or all are stored.
         """
         with self._reached():
-            found = self._client.list_workflows(
-                workflow_ids=[*cells], load_input=False, load_output=False
-            )
-            known = {one.workflow_id: one.status for one in found}
-            over = [order for order, status in known.items() if status not in _PLACES]
-            if over:
-                self._client.delete_workflows(over)
-            new = tuple(order for order in cells if known.get(order) not in _PLACES)
+            held = self.held()  # without those that an agent of another name left in its queue
+            new = tuple(order for order in cells if order not in held)
+            if new:
+                self._client.delete_workflows([*new])  # what is on record of earlier deliveries
             with self._database.begin() as transaction:
                 for order in new:
                     options: EnqueueOptions = {
@@ -244,15 +239,19 @@ class Engine:
                 self._news = True
                 self._room.notify_all()
 
-    def stop(self, wait_s: float) -> frozenset[str]:
-        """Begin no more jobs, wait ``wait_s`` seconds for those that run, and end the engine.
+    def stop(
+        self, wait_s: float, given_up: Callable[[], frozenset[str]] = frozenset
+    ) -> frozenset[str]:
+        """Begin no more jobs, wait for those that run and are not given up, and end the engine.
 
         Returns:
             The orders of those that run on: the next engine begins them again.
         """
         with self._room:
             self._draining = True
-            self._room.wait_for(lambda: not self._running, wait_s)
+            for _ in range(math.ceil(wait_s)):
+                if self._room.wait_for(lambda: self._running <= given_up(), min(wait_s, 1.0)):
+                    break
         self._end()
         return self.running()
 
@@ -281,7 +280,7 @@ def _database(url: str, connections: int) -> sqlalchemy.Engine:
         return made
     return sqlalchemy.create_engine(
         "postgresql+psycopg://",
-        connect_args={**parameters_of(url), **_NOTICED},
+        creator=lambda: prompt_connection(server_parameters(url)),
         pool_size=connections,
         max_overflow=0,
         pool_pre_ping=True,

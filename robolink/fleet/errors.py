@@ -1,4 +1,4 @@
-"""Errors about plans; both end a command with exit code 2."""
+"""Errors about plans; each ends a command with exit code 2."""
 
 from robolink.errors import ConfigError
 
@@ -9,3 +9,7 @@ class PlanError(ConfigError):
 
 class PlantError(ConfigError):
     """The plant's database cannot be opened, read or added to."""
+
+
+class PlantVersionError(PlantError):
+    """The tables of the plant's database are those of another version of robolink."""

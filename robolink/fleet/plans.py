@@ -15,6 +15,7 @@ from robolink.files.toml import FileKind, Problem
 from robolink.fleet.errors import PlanError
 from robolink.fleet.states import PlanKind
 from robolink.fleet.windows import Window
+from robolink.journal import this_computer
 from robolink.messages import tr
 from robolink.timing import wall_label
 from robolink.transaction import require_order_id
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
     from robolink.fleet.plan_tables import PlanFile
+    from robolink.recipe import LoadedRecipe
 
 SCHEMA: Final = "robolink/fleet-plan/1"
 LONGEST_ID: Final = 12
@@ -51,6 +53,8 @@ class Plan:
         expected_refusals: Share of cells that are expected to refuse.
         author: Who made it.
         made_at: When, as a label: ISO 8601, UTC.
+        homes: The home of each cell: the computer whose agent carries its job out. Empty where no
+            cell file names one; then all of the plan is carried out on one computer, whichever.
     """
 
     id: str
@@ -68,6 +72,7 @@ class Plan:
     expected_refusals: float = 0.03
     author: str = ""
     made_at: str = ""
+    homes: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -100,8 +105,8 @@ class Plan:
         """
         return not self.window or Window.parse(self.window).is_open(now)
 
-    def require_recipe(self) -> None:
-        """Check that the recipe is the one that was frozen.
+    def require_recipe(self) -> "LoadedRecipe | None":
+        """Return the recipe, which is the one that was frozen; ``None`` for a kind without one.
 
         Raises:
             PlanError: It is another one.
@@ -109,7 +114,8 @@ class Plan:
         """
         from robolink.recipe import load_recipe
 
-        if self.recipe and load_recipe(Path(self.recipe)).sha256 != self.recipe_hash:
+        loaded = load_recipe(Path(self.recipe)) if self.recipe else None
+        if loaded is not None and loaded.sha256 != self.recipe_hash:
             raise PlanError(
                 tr(
                     "The recipe {path} is not the one of plan {plan}.",
@@ -118,6 +124,7 @@ class Plan:
                 ),
                 remedy=tr("Nothing was sent. Restore the file, or make a new plan with it."),
             )
+        return loaded
 
     def document(self) -> dict[str, object]:
         """Return all of it as plain JSON."""
@@ -138,6 +145,7 @@ class Plan:
             "expected_refusals": self.expected_refusals,
             "author": self.author,
             "made_at": self.made_at,
+            **({"homes": dict(self.homes)} if self.homes else {}),
         }
 
     @classmethod
@@ -181,6 +189,7 @@ def load_plan(
     author: str = "",
     made_at: str = "",
     groups: Mapping[str, Sequence[str]] | None = None,
+    homes: Mapping[str, str] | None = None,
 ) -> Plan:
     r"""Return the plan that a file describes, frozen.
 
@@ -190,6 +199,8 @@ def load_plan(
         author: Who makes it.
         made_at: When, as a label: ISO 8601, UTC; now unless given.
         groups: Groups of cells, by name.
+        homes: Homes of the cells whose files name one, as ``load_cell_files().homes``. A cell
+            without one has its home here, if another cell of the plan has one.
 
     Raises:
         ConfigError: The file, or its recipe, cannot be read or is wrong; every problem is told.
@@ -203,7 +214,15 @@ def load_plan(
         ('a1', 'a2')
     """
     table = PLAN_FILE.parse(path, PLAN_FILE.read(path))
-    return plan_of(table, path=path, cells=cells, author=author, made_at=made_at, groups=groups)
+    return plan_of(
+        table,
+        path=path,
+        cells=cells,
+        author=author,
+        made_at=made_at,
+        groups=groups,
+        homes=homes,
+    )
 
 
 def plan_of(
@@ -213,6 +232,7 @@ def plan_of(
     author: str = "",
     made_at: str = "",
     groups: Mapping[str, Sequence[str]] | None = None,
+    homes: Mapping[str, str] | None = None,
     path: Path = Path("plan.toml"),
 ) -> Plan:
     """Return the plan that a table describes, with the keys of a plan file, frozen.
@@ -223,6 +243,7 @@ def plan_of(
         author: Who makes it.
         made_at: When, as a label: ISO 8601, UTC; now unless given.
         groups: Groups of cells, by name.
+        homes: As of :func:`load_plan`.
         path: Where a recipe's path begins, and the name of the plan in errors.
 
     Raises:
@@ -267,11 +288,20 @@ def plan_of(
         expected_refusals=said.expected_refusals,
         author=author,
         made_at=made_at or wall_label(),
+        homes=_homes([cell for ring in rings for cell in ring], homes or {}),
     )
     plan = replace(draft, id=_id_of(draft.document()))
     for cell in plan.cells:
         require_order_id(plan.order(cell))
     return plan
+
+
+def _homes(cells: Sequence[str], homes: Mapping[str, str]) -> dict[str, str]:
+    """Return the home of each cell; nothing where none of them names one."""
+    if not any(homes.get(cell) for cell in cells):
+        return {}
+    here = this_computer()
+    return {cell: homes.get(cell) or here for cell in cells}
 
 
 def _named(

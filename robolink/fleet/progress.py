@@ -3,13 +3,19 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Final
 
 from robolink.fleet.corrections import TipCorrection
 from robolink.fleet.halts import HaltRule
 from robolink.fleet.outcome_codes import Treatment
 from robolink.fleet.plans import Plan
 from robolink.fleet.states import JobState, WaitReason
+from robolink.journal import computer_key
 from robolink.messages import tr
+
+SILENT_S: Final = 60.0
+"""How long an agent that gives a sign of life every ten seconds may be silent, in s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +37,8 @@ class CellJob:
         change: Id of the change in the cell's journal; empty for none.
         treatment: What that end meant; empty before one ended.
         sequence: The order in which the jobs of the plan came to their last end; 0 before.
+        proof: Number of the entry in the cell's journal of the later turn test that confirmed a
+            value written without motion; 0 for none.
     """
 
     plan: str
@@ -47,6 +55,7 @@ class CellJob:
     change: str = ""
     treatment: Treatment | None = None
     sequence: int = 0
+    proof: int = 0
 
     @property
     def order(self) -> str:
@@ -102,8 +111,6 @@ class Halt:
                 return tr("{by} halted it: {reason}", by=self.by, reason=reason)
             case HaltRule.PERSON:
                 return tr("{by} halted it.", by=self.by)
-            case HaltRule.PAUSE if self.before_the_start and told.get("moves"):
-                return tr("It was not started yet: robolink fleet resume {plan}", plan=self.plan)
             case HaltRule.PAUSE if self.before_the_start:
                 return tr("It was not started yet: robolink fleet run {plan}", plan=self.plan)
             case HaltRule.PAUSE:
@@ -192,6 +199,8 @@ class WaitFacts:
         running: How many of its jobs are running.
         most: How many may be.
         busy: Cells at which a job of another plan runs.
+        away: Cells whose job nobody carries out now: no agent is heard at their home, or, for
+            whoever asks whether a job may begin, their home is another computer.
     """
 
     halt: HaltRule | None
@@ -201,6 +210,7 @@ class WaitFacts:
     running: int
     most: int
     busy: frozenset[str] = frozenset()
+    away: frozenset[str] = frozenset()
 
     @property
     def may_write(self) -> bool:
@@ -217,6 +227,8 @@ class WaitFacts:
             return WaitReason.WINDOW
         if not self.permitted:
             return WaitReason.PERMIT
+        if job.cell in self.away:
+            return WaitReason.HOME
         if job.cell in self.busy:
             return WaitReason.CELL_BUSY
         if self.running >= self.most:
@@ -264,7 +276,7 @@ class Turn:
     @property
     def begun(self) -> bool:
         """Whether it is to be carried out now: begun just now, or not ended when it was killed."""
-        return self.job.state is JobState.RUNNING
+        return self.job.state is JobState.RUNNING and self.why is None
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,6 +293,34 @@ class RecordedOutcome:
     job: CellJob
     halt: Halt | None = None
     repeated: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PlantHome:
+    """A computer that is the home of cells of a plant.
+
+    Attributes:
+        plant: Id of the plant.
+        home: Its name.
+        heard_at: When its agent was heard last, as a label of its own clock; empty for never.
+        agent: Which process that was.
+    """
+
+    plant: str
+    home: str
+    heard_at: str = ""
+    agent: str = ""
+
+    def is_heard(self, now: datetime) -> bool:
+        """Return whether its agent was heard so lately that it counts as at work.
+
+        Args:
+            now: The time, with its zone.
+        """
+        if not self.heard_at:
+            return False
+        silent = now - datetime.fromisoformat(self.heard_at)
+        return silent.total_seconds() < SILENT_S  # a clock that is ahead is heard, too
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,6 +355,8 @@ class PlanProgress:
         halts: Why it stands and stood, oldest first.
         facts: What holds its jobs back now.
         cancelled_at: When it was cancelled; empty where it was not.
+        bound_to: The computer that carries it out, where its cells name no home and one has begun.
+        homes: The homes of its cells, by their :func:`~robolink.journal.computer_key`.
     """
 
     plan: Plan
@@ -322,12 +364,39 @@ class PlanProgress:
     halts: tuple[Halt, ...]
     facts: WaitFacts
     cancelled_at: str = ""
+    bound_to: str = ""
+    homes: Mapping[str, PlantHome] = field(default_factory=dict, hash=False)
+
+    def home_of(self, cell: str) -> PlantHome | None:
+        """Return the home of a cell; ``None`` where its job may be carried out on any computer."""
+        return self.homes.get(computer_key(self.plan.homes.get(cell) or self.bound_to))
+
+    def is_at_home(self, cell: str, computer: str) -> bool:
+        """Return whether the job of a cell is carried out by a computer.
+
+        Args:
+            cell: The cell.
+            computer: Name of the computer.
+        """
+        home = self.home_of(cell)
+        return home is None or computer_key(home.home) == computer_key(computer)
+
+    def homes_left(self) -> tuple[PlantHome, ...]:
+        """Return the homes at which a job of it waits or runs."""
+        left = {
+            home.home: home
+            for job in self.jobs
+            if not job.state.final and (home := self.home_of(job.cell)) is not None
+        }
+        return tuple(left.values())
 
     def why(self, job: CellJob) -> WaitReason | None:
         """Return why a job waits, ``None`` for one that does not."""
         if job.state is not JobState.WAITING:
             return None
         why = self.facts.why(job)
+        if why is WaitReason.TURN and self.plan.kind.moves:
+            return WaitReason.PERSON
         if why is WaitReason.TURN and job.treatment is not None and job.treatment.again:
             return WaitReason.CELL_OFF if job.treatment is Treatment.OFF else WaitReason.CELL_BUSY
         return why

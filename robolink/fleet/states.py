@@ -58,11 +58,22 @@ class WaitReason(StrEnum):
     RING = "ring"
     WINDOW = "window"
     PERMIT = "permit"
+    HOME = "home"
     CELL_OFF = "cell_off"
     CELL_BUSY = "cell_busy"
     BUDGET = "budget"
     TURN = "turn"
+    PERSON = "person"
 
+
+_KINDS: Final = {
+    PlanKind.BACKUP: declared("backup"),
+    PlanKind.CHECK: declared("cell check"),
+    PlanKind.DRIFT: declared("drift report"),
+    PlanKind.RECIPE: declared("recipe"),
+    PlanKind.OFFSET: declared("offset"),
+    PlanKind.NOZZLE_CHANGE: declared("nozzle change"),
+}
 
 _STATES: Final = {
     JobState.WAITING: declared("waiting"),
@@ -81,11 +92,18 @@ _WAITS: Final = {
     WaitReason.RING: declared("an earlier ring is not finished"),
     WaitReason.WINDOW: declared("the plan's window is closed"),
     WaitReason.PERMIT: declared("no permit holds now"),
+    WaitReason.HOME: declared("its home, which is another computer, or where no agent is heard"),
     WaitReason.CELL_OFF: declared("the cell does not answer; it will be tried again"),
     WaitReason.CELL_BUSY: declared("the cell is busy; it will be tried again"),
     WaitReason.BUDGET: declared("as many cells are at work as the plan allows"),
     WaitReason.TURN: declared("nothing: it is next"),
+    WaitReason.PERSON: declared("a person at the cell, who begins it"),
 }
+
+
+def kind_in_words(kind: PlanKind) -> str:
+    """Return what a person is told of a kind of plan."""
+    return spoken(_KINDS[kind])
 
 
 def state_in_words(state: JobState) -> str:

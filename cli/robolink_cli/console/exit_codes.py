@@ -121,7 +121,8 @@ MEANINGS: Final[dict[int, str]] = {
         "`journal move` with `--dry-run` found something in the way; "
         "`check-contract` found a failed check; `cell doctor`, `cell ports` or `cell check` "
         "found something that needs attention; `fleet run` left cells that did not do what was "
-        "asked"
+        "asked; `fleet next` had no job at the cell; `cell fleet report` shows something that "
+        "needs a person"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
     3: (

@@ -70,6 +70,8 @@ class _Declared(NamedTuple):
             attributes["required"] = not self.defaults
             if multiple:
                 attributes["nargs"] = -1
+            elif self.defaults and self.defaults[0] is not None:
+                attributes["default"] = self.defaults[0]
             return click.argument(self.name, **attributes | self.marker.attributes)
         flag = attributes.get("is_flag", False)
         if multiple:

@@ -23,8 +23,9 @@ from robolink.errors import RobolinkError
 from robolink.locale.languages import language_named
 from robolink.messages import in_english, tr
 from robolink_cli.panel.board import may_begin
-from robolink_cli.panel.cards import ChangeRow, ChartCard
+from robolink_cli.panel.cards import CellChoice, ChangeRow, ChartCard
 from robolink_cli.panel.guard.access import Access
+from robolink_cli.panel.guard.answers import nothing_here, posted, refused, short_text
 from robolink_cli.panel.guard.live import ANYTIME
 from robolink_cli.panel.guard.pairing import Tablet
 from robolink_cli.panel.guard.requests import MOST_BYTES, parsed
@@ -32,6 +33,9 @@ from robolink_cli.panel.history import changes_of, charts_of, page_of
 from robolink_cli.panel.hub import Hub, LivePage
 from robolink_cli.panel.jobs import KINDS, end_all, options_of
 from robolink_cli.panel.pages import HERE, Pages, Watcher
+from robolink_cli.panel.plant.desk import PlantDesk
+from robolink_cli.panel.plant.plan_pages import PlanPages
+from robolink_cli.panel.plant.plan_watch import PlanWatch
 from robolink_cli.panel.stop import StopAnswer, StopAsked, StopDesk
 from robolink_cli.panel.tastes import Tastes
 from robolink_cli.panel.words import speaking_in
@@ -50,9 +54,6 @@ LATE_AFTER_MS: Final = 1500.0
 _ID: Final = 12
 """Digits of a tablet's id that go on record."""
 
-_MOST_TEXT: Final = 200
-"""Longest value that goes with a press, in characters."""
-
 
 class Panel:
     """The application.
@@ -62,12 +63,25 @@ class Panel:
         stops: Takes the presses of STOP.
         access: Who asks.
         tastes: How each tablet wants its pages.
+        looking: Asks the plant's database how plans stand.
+        ordering: Asks it for what somebody waits for.
     """
 
-    def __init__(self, hub: Hub, stops: StopDesk, access: Access, tastes: Tastes) -> None:
+    def __init__(
+        self,
+        hub: Hub,
+        stops: StopDesk,
+        access: Access,
+        tastes: Tastes,
+        *,
+        looking: PlantDesk,
+        ordering: PlantDesk,
+    ) -> None:
         self.hub, self._stops, self._access, self._tastes = hub, stops, access, tastes
         self._seats, self._note = access.seats, access.audit.note
         self._pages: Pages = hub.pages
+        watch = PlanWatch(looking, hub.plans_changed)
+        self.plans = PlanPages(watch, ordering, self._pages, access, self._watcher)
 
     def application(self) -> Starlette:
         """Return it for a server."""
@@ -78,6 +92,7 @@ class Panel:
                 Route("/cell/{cell}/history", self._history),
                 Route("/cell/{cell}/picture", self._picture),
                 Route("/cell/{cell}/report/{change}", self._report),
+                *self.plans.routes(),
                 Route("/login", self._login),
                 Route("/pair", self._pair),
                 Route("/static/{name}", self._static),
@@ -95,11 +110,12 @@ class Panel:
 
     @asynccontextmanager
     async def _living(self, _: Starlette) -> AsyncIterator[None]:
-        hub = asyncio.ensure_future(self.hub.run())
+        runs = [asyncio.ensure_future(one.run()) for one in (self.hub, self.plans.watch)]
         try:
             yield
         finally:
-            hub.cancel()
+            for one in runs:
+                one.cancel()
             jobs = [board.job for board in self.hub.boards.values() if board.job is not None]
             await end_all(jobs, LEAVE_S)
 
@@ -126,19 +142,19 @@ class Panel:
         return self._access.token_of(asked.scope)
 
     async def _overview(self, request: Request) -> Response:
-        watcher, now_s = self._watcher(request), time.monotonic()
-        cards = self.hub.cards(watcher, now_s)
-        parts = self.hub.overview(watcher, now_s)
-        token = self._token(request)
+        watcher, choice = self._watcher(request), CellChoice.of(request.query_params)
+        self.hub.has_plans = self.plans.watch.present
+        parts = self.hub.overview(watcher, time.monotonic(), choice)
+        token, query = self._token(request), choice.query
         return HTMLResponse(
-            self._pages.page("overview", watcher, cells=cards, parts=parts, token=token)
+            self._pages.page("overview", watcher, parts=parts, token=token, query=query)
         )
 
     async def _cell(self, request: Request) -> Response:
         name = request.path_params["cell"]
         board = self.hub.boards.get(name)
         if board is None:
-            return _nothing_here()
+            return nothing_here()
         watcher = self._watcher(request, name)
         return HTMLResponse(
             self._pages.page(
@@ -154,7 +170,7 @@ class Panel:
     async def _history(self, request: Request) -> Response:
         board = self.hub.boards.get(request.path_params["cell"])
         if board is None:
-            return _nothing_here()
+            return nothing_here()
         watcher, url = self._watcher(request, board.name), board.cell.url
 
         def found() -> tuple[tuple[ChangeRow, ...], tuple[ChartCard, ...]]:
@@ -176,7 +192,7 @@ class Panel:
     async def _report(self, request: Request) -> Response:
         board = self.hub.boards.get(request.path_params["cell"])
         if board is None:
-            return _nothing_here()
+            return nothing_here()
         change = request.path_params["change"]
         return HTMLResponse(await asyncio.to_thread(page_of, board.cell.url, change))
 
@@ -184,10 +200,10 @@ class Panel:
         """Answer with the newest picture of the cell's camera, a PNG file."""
         board = self.hub.boards.get(request.path_params["cell"])
         if board is None or board.camera is None:
-            return _nothing_here()
+            return nothing_here()
         # Circles of one picture on another would lie.
         if request.query_params.get("v") != board.camera.stamp:
-            return _nothing_here()
+            return nothing_here()
         return Response(board.camera.picture.png, media_type="image/png")
 
     async def _login(self, request: Request) -> Response:
@@ -198,7 +214,9 @@ class Panel:
 
     def _about_people(self, kind: str, request: Request) -> Response:
         cell = request.query_params.get("cell", "")
+        plan = request.query_params.get("plan", "")
         onward = f"/cell/{quote(cell)}" if cell in self.hub.boards else "/"
+        onward = f"/plan/{quote(plan)}" if plan.isalnum() else onward
         people = self._access.people.values()
         names = sorted({name for of_cell in people for name in of_cell or ()})
         watcher, token = self._watcher(request), self._token(request)
@@ -210,7 +228,7 @@ class Panel:
         name = request.path_params["name"]
         kind = _STATIC.get(name)
         if kind is None:
-            return _nothing_here()
+            return nothing_here()
         content = files("robolink_cli.panel").joinpath("static", name).read_bytes()
         return Response(content, media_type=kind)
 
@@ -229,7 +247,15 @@ class Panel:
                 frame = {**frame, "at_ms": self._stops.at_ms()}
             await socket.send_text(json.dumps(frame, ensure_ascii=False, separators=(",", ":")))
 
-        live = LivePage(send, lambda: self._watcher(socket, cell), tablet.id, cell)
+        said = socket.query_params
+        live = LivePage(
+            send,
+            lambda: self._watcher(socket, cell),
+            tablet.id,
+            cell,
+            draw=None if cell else self.plans.drawing(said),
+            choice=CellChoice.of(said),
+        )
         token = self._token(socket)
         await send({"t": "hello", "server": self.hub.server, "token": token})
         listens = asyncio.ensure_future(self._listen(socket, live))
@@ -261,7 +287,7 @@ class Panel:
             case "press":
                 why = self._press(socket, live, frame)
                 if why:
-                    said = {"t": "refused", "press": _text(frame.get("press")), "why": why}
+                    said = {"t": "refused", "press": short_text(frame.get("press")), "why": why}
                     self.hub.spawn(self._tell(live, said))
             case "hold" | "beat" | "release" as what:
                 self._held(socket, live, what, frame)
@@ -275,7 +301,7 @@ class Panel:
     def _press(self, socket: WebSocket, live: LivePage, frame: Mapping[str, Any]) -> str:
         """Pass a press on to the job; return why it is refused, empty where it is not."""
         tablet = self._access.tablet_of(socket.scope)
-        action, value = _text(frame.get("action")), _text(frame.get("value"))
+        action, value = short_text(frame.get("action")), short_text(frame.get("value"))
         facts = {"tablet": tablet.id[:_ID], "who": tablet.who, "action": action, "value": value}
         board = self.hub.boards.get(live.cell)
         job = board.job if board is not None else None
@@ -303,7 +329,7 @@ class Panel:
 
     def _held(self, socket: WebSocket, live: LivePage, what: str, frame: Mapping[str, Any]) -> None:
         """Pass a finger on a key that repeats on to the job."""
-        board, finger = self.hub.boards.get(live.cell), _text(frame.get("finger"))
+        board, finger = self.hub.boards.get(live.cell), short_text(frame.get("finger"))
         job = board.job if board is not None else None
         if board is None or job is None or not finger:
             return
@@ -312,7 +338,7 @@ class Panel:
         elif what == "beat":
             job.beat(finger)
         elif frame.get("number") == board.number:
-            tablet, axis = self._access.tablet_of(socket.scope), _text(frame.get("axis"))
+            tablet, axis = self._access.tablet_of(socket.scope), short_text(frame.get("axis"))
             if self._access.why_not_answer(tablet, live.cell, job.who):
                 return
             facts = {"tablet": tablet.id[:_ID], "who": tablet.who, "action": "hold"}
@@ -330,14 +356,14 @@ class Panel:
         await self._tell(live, answer)
 
     async def _stop(self, request: Request) -> Response:
-        said = await _body(request)
-        cell = _text(said.get("cell"))
+        said = await posted(request)
+        cell = short_text(said.get("cell"))
         if cell not in self.hub.boards:
-            return _nothing_here()
+            return nothing_here()
         return JSONResponse(await self._carry_out(request, said, [cell], everywhere=False))
 
     async def _stop_all(self, request: Request) -> Response:
-        said = await _body(request)
+        said = await posted(request)
         cells = self._of_this_panel()
         return JSONResponse(await self._carry_out(request, said, cells, everywhere=True))
 
@@ -348,7 +374,7 @@ class Panel:
         self, asked: HTTPConnection, said: Mapping[str, Any], cells: list[str], *, everywhere: bool
     ) -> dict[str, object]:
         tablet = self._access.tablet_of(asked.scope)
-        taste, press = self._tastes.of(tablet.id), _text(said.get("press"))
+        taste, press = self._tastes.of(tablet.id), short_text(said.get("press"))
         if not tablet.paired:
             with speaking_in(taste.language):
                 why = tr("This tablet is not paired: it stops nothing. Press the red button.")
@@ -370,16 +396,16 @@ class Panel:
     # Seats and jobs.
 
     async def _take_seat(self, request: Request) -> Response:
-        said = await _body(request)
-        board = self.hub.boards.get(_text(said.get("cell")))
+        said = await posted(request)
+        board = self.hub.boards.get(short_text(said.get("cell")))
         if board is None:
-            return _nothing_here()
+            return nothing_here()
         tablet = self._access.tablet_of(request.scope)
         facts = {"tablet": tablet.id[:_ID], "who": tablet.who}
         taken = self._seats.take(board.name, tablet, moving=board.moving)
         if taken.why_not:
             self._note("refused", board.name, why="moving", action="seat", **facts)
-            return _refused(taken.why_not)
+            return refused(taken.why_not)
         if taken.from_whom is not None:
             facts["before"] = taken.from_whom.who
         self._note("seat", board.name, **facts)
@@ -387,10 +413,10 @@ class Panel:
         return JSONResponse({})
 
     async def _leave_seat(self, request: Request) -> Response:
-        said = await _body(request)
-        board = self.hub.boards.get(_text(said.get("cell")))
+        said = await posted(request)
+        board = self.hub.boards.get(short_text(said.get("cell")))
         if board is None:
-            return _nothing_here()
+            return nothing_here()
         tablet = self._access.tablet_of(request.scope)
         self._seats.leave(board.name, tablet.id, moving=board.moving)
         self._note("seat_left", board.name, tablet=tablet.id[:_ID], who=tablet.who)
@@ -398,11 +424,11 @@ class Panel:
         return JSONResponse({})
 
     async def _start(self, request: Request) -> Response:
-        said = await _body(request)
-        board = self.hub.boards.get(_text(said.get("cell")))
-        kind = KINDS.get(_text(said.get("job")))
+        said = await posted(request)
+        board = self.hub.boards.get(short_text(said.get("cell")))
+        kind = KINDS.get(short_text(said.get("job")))
         if board is None or kind is None:
-            return _nothing_here()
+            return nothing_here()
         tablet = self._access.tablet_of(request.scope)
         taste = self._tastes.of(tablet.id)
         facts = {
@@ -413,7 +439,7 @@ class Panel:
         }
         role = self._access.role(tablet.who, board.name)
         station = board.station(kind, said.get("values"))
-        recipe = board.recipe(kind, said.get("values"))
+        subject = board.subject(kind, said.get("values"))
         why = ""
         if role is None or not may_begin(kind, role):
             why = tr("This takes an engineer.")
@@ -421,11 +447,13 @@ class Panel:
             why = tr("A job is running on this cell already.")
         elif kind.of_station and station is None:
             why = tr("This cell has no such station.")
-        elif kind.of_recipe and _names_a_recipe(said.get("values")) and not recipe:
+        elif kind.of_recipe and _names_a_recipe(said.get("values")) and not subject:
             why = tr("This recipe is not offered any more. Choose again.")
+        elif kind.of_plan and not subject:
+            why = tr("This job of a plan is not offered any more. Choose again.")
         if why:
             self._note("refused", board.name, why=in_english(why), **facts)
-            return _refused(why)
+            return refused(why)
         self._note("answer", board.name, question="which job", **facts)
         try:
             await self.hub.begin(
@@ -435,17 +463,17 @@ class Panel:
                 who=tablet.who,
                 values=options_of(kind, said.get("values")),
                 station=station,
-                recipe=recipe,
+                subject=subject,
             )
         except OSError as error:
             cause = error.strerror or str(error)
-            return _refused(tr("The job could not be started: {cause}.", cause=cause))
+            return refused(tr("The job could not be started: {cause}.", cause=cause))
         return JSONResponse({})
 
     async def _set_taste(self, request: Request) -> Response:
-        said = await _body(request)
+        said = await posted(request)
         tablet = self._access.tablet_of(request.scope)
-        language, dark = language_named(_text(said.get("language"))), said.get("dark")
+        language, dark = language_named(short_text(said.get("language"))), said.get("dark")
         self._tastes.set(tablet.id, language, dark if isinstance(dark, bool) else None)
         self.hub.everything_changed(tablet.id)
         return JSONResponse({})
@@ -456,23 +484,5 @@ async def _told(_: Request, error: RobolinkError) -> Response:
     return PlainTextResponse(f"{error.what}\n{error.remedy}", 503)
 
 
-def _nothing_here() -> Response:
-    return JSONResponse({"why": tr("There is no such page.")}, 404)
-
-
-def _refused(why: str) -> Response:
-    return JSONResponse({"why": why}, 409)
-
-
 def _names_a_recipe(given: object) -> bool:
     return isinstance(given, Mapping) and "recipe" in given
-
-
-async def _body(request: Request) -> Mapping[str, Any]:
-    data = await request.body()
-    return (parsed(data) if len(data) <= MOST_BYTES else None) or {}
-
-
-def _text(given: object) -> str:
-    """Return a short text; anything else is none."""
-    return given if isinstance(given, str) and len(given) <= _MOST_TEXT else ""

@@ -16,8 +16,9 @@ from robolink_cli.panel.jobs import KINDS, JobKind, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
 from robolink_cli.panel.recipes import RecipeOffer
 from robolink_cli.panel.record import Standing
-from robolink_cli.panel.watch import CellWatch, card_of
+from robolink_cli.panel.watch import CellWatch, card_of, mark_of
 from robolink_cli.panel.words import speaking_in
+from robolink_cli.session.cell_plans import PlannedJob
 from robolink_cli.wizard.views.records import MovingView, TouchView, View
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ class Board:
         self.watch = CellWatch(cell.name, cell.url, cell.watch_s, self.renew, slots)
         self.standing = Standing()
         self.recipes: tuple[RecipeOffer, ...] = ()
+        self.planned: PlannedJob | None = None
         self.record_s = 0.0
         self._simulated: bool | None = None
         self.job: PanelJob | None = None
@@ -171,14 +173,44 @@ class Board:
                 return self._busy(watcher, self.job, seat)
             simulated, said = self.simulated, self.said
             card = card_of(self.watch, self.standing, now_s, simulated=simulated, said=said)
+            if self.planned is not None:
+                waits = self._planned(self.planned)
+                mark = "look" if card.mark == "ok" else card.mark
+                card = replace(card, mark=mark, lines=(waits, *card.lines))
             return replace(card, seat=seat, jobs=self.offers(watcher))
+
+    def sign(self, now_s: float) -> str:
+        """Return by what it is found among many cells: one of :data:`.cards.SIGNS`."""
+        if self.job is not None:
+            return "bad" if self._halted else "busy"
+        mark = mark_of(self.watch, self.standing, now_s)
+        # Nobody has looked at most of many cells; what is open there is on record all the same.
+        waits = self.standing.is_open or self.planned is not None
+        return "look" if waits and mark in ("unknown", "ok") else mark
+
+    @property
+    def _halted(self) -> bool:
+        view = self.view
+        return view is not None and view.status is not None and view.status.halted
 
     def offers(self, watcher: Watcher) -> tuple[JobOffer, ...]:
         """Return the jobs that can be begun, in the language that is spoken."""
         found = list[JobOffer]()
         for kind in filter(self._is_of_use, KINDS.values()):
             why_not = self._why_not(kind, watcher)
-            if kind.of_recipe and self.recipes and self._names_differ():
+            if kind.of_plan:
+                planned = self.planned
+                assert planned is not None  # noqa: S101 - else it is of no use
+                found.append(
+                    JobOffer(
+                        kind.name,
+                        self._planned(planned),
+                        planned.told(),
+                        values={"plan": planned.plan.id},
+                        why_not=why_not,
+                    )
+                )
+            elif kind.of_recipe and self.recipes and self._names_differ():
                 found += self._with_recipes(kind, why_not)
             elif kind.of_station:
                 found += [
@@ -193,6 +225,11 @@ class Board:
             else:
                 found.append(JobOffer(kind.name, spoken(kind.title), why_not=why_not))
         return tuple(found)
+
+    @staticmethod
+    def _planned(planned: PlannedJob) -> str:
+        """Return what a plan's job is called."""
+        return tr("Plan {name} waits for you here", name=planned.plan.name)
 
     def _learning(self, station: str) -> str:
         """Return what learning a station is called."""
@@ -223,14 +260,18 @@ class Board:
             for one in self.recipes
         ]
 
-    def recipe(self, kind: JobKind, given: object) -> str:
-        """Return the file of a job's recipe; empty where the press names none that is offered.
+    def subject(self, kind: JobKind, given: object) -> str:
+        """Return the file of a job's recipe, or its plan; empty where the press names none offered.
 
         Args:
             kind: The job.
             given: ``values`` of the press.
         """
-        named = given.get("recipe") if isinstance(given, Mapping) else None
+        values = given if isinstance(given, Mapping) else {}
+        if kind.of_plan:
+            plan = "" if self.planned is None else self.planned.plan.id
+            return plan if values.get("plan") == plan else ""
+        named = values.get("recipe")
         if not kind.of_recipe or not self._names_differ():
             return ""
         return next((str(one.path) for one in self.recipes if one.name == named), "")
@@ -252,6 +293,8 @@ class Board:
             return bool(self.standing.interrupted)
         if kind.of_station:
             return self.cell.tool is not None
+        if kind.of_plan:
+            return self.planned is not None
         if kind.name == "release":
             look = self.watch.look
             held = look is not None and look.read.get("held_by_a_stop") is True
@@ -271,9 +314,8 @@ class Board:
         lines = [title] if view is None else [f"{title}: {view.head.title}"]
         if view is not None and view.head.step:
             lines.append(tr("Step {k} of {n}", k=view.head.step[0], n=view.head.step[1]))
-        halted = view is not None and view.status is not None and view.status.halted
         mark, word = "look", tr("job running")
-        if halted and view is not None and view.status is not None:
+        if self._halted and view is not None and view.status is not None:
             mark, word = "bad", view.status.state
         elif self.moving:
             word = tr("moving")

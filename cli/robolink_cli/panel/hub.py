@@ -8,9 +8,11 @@ up another. Nothing here reaches a controller.
 import asyncio
 import secrets
 import time
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from typing import Any, Final, Protocol
 
 from robolink.errors import RobolinkError
@@ -20,13 +22,14 @@ from robolink.transport import far_end_of
 from robolink_cli.console.output import show
 from robolink_cli.panel.board import OVERVIEW_S, Board, PanelCell
 from robolink_cli.panel.camera import READ_S, newest_of
-from robolink_cli.panel.cards import CellCard
+from robolink_cli.panel.cards import A_PAGE, ALL_CELLS, SIGNS, CellChoice, CellsBar, GroupCard
 from robolink_cli.panel.jobs import JobKind, PanelJob
 from robolink_cli.panel.pages import Pages, Parts, Watcher
 from robolink_cli.panel.recipes import recipes_of
 from robolink_cli.panel.record import standing_of
 from robolink_cli.panel.watch import AT_ONCE
 from robolink_cli.panel.words import speaking_in
+from robolink_cli.session.cell_plans import PlannedJob, due_at_cells
 from robolink_cli.session.plant_outbox import PLANT_S, copy_journals_in_use
 
 BEAT_S: Final = 0.25
@@ -43,6 +46,15 @@ ALIVE_S: Final = 0.5
 
 RECORD_S: Final = 10.0
 """Interval in s at which the record of a cell is read anew while a page shows it."""
+
+MANY_CELLS: Final = 200
+"""So many records can be read within that time, with time left for all else."""
+
+READS_AT_ONCE: Final = 2
+"""Records that are read at the same time, where nobody waits for one."""
+
+AGAIN_S: Final = 0.25
+"""Shortest time in s between two drawings of the page of many cells."""
 
 
 class SeatHolder(Protocol):
@@ -80,7 +92,9 @@ class LivePage:
         send: Sends a frame; it waits while the tablet is slow.
         watcher: Who looks, as it is now.
         tablet: Id of the tablet.
-        cell: The cell that the page shows; empty for the overview.
+        cell: The cell that the page shows; empty for any other page.
+        draw: Draws a page that is about no cell; ``None`` for the overview, and that of a cell.
+        choice: Which cells the overview shows.
         heard_s: When the last frame came from it, monotonic.
     """
 
@@ -88,10 +102,16 @@ class LivePage:
     watcher: Callable[[], Watcher]
     tablet: str
     cell: str = ""
+    draw: Callable[[Watcher, float], Parts] | None = None
+    choice: CellChoice = ALL_CELLS
     heard_s: float = field(default_factory=time.monotonic)
     news: asyncio.Event = field(default_factory=asyncio.Event)
     shown: dict[str, str] = field(default_factory=dict)
     screen: tuple[str, int] = ("", -1)
+
+    def follows(self, cell: str) -> bool:
+        """Return whether something new of a cell may show on it."""
+        return self.cell == cell or (not self.cell and self.draw is None)
 
 
 class Hub:
@@ -102,6 +122,11 @@ class Hub:
         pages: Draws it.
         seats: Who works on which.
         note: Puts something on record: kind, cell, facts.
+        groups: The words of each group of the cell files.
+        plant: Id of the plant whose plans people carry out here.
+
+    Attributes:
+        has_plans: Whether there is a page of plans.
     """
 
     def __init__(
@@ -110,25 +135,36 @@ class Hub:
         pages: Pages,
         seats: SeatTable,
         note: Callable[..., None],
+        groups: Mapping[str, Sequence[str]] | None = None,
+        *,
+        plant: str = "plant",
     ) -> None:
         slots = asyncio.Semaphore(AT_ONCE)
         self.boards = {cell.name: Board(cell, self._changed, slots) for cell in cells}
         self.pages = pages
         self._seats = seats
-        self._note = note
+        self._note, self._plant = note, plant
         self.server = secrets.token_hex(8)
         self.lives: set[LivePage] = set()
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._drawn: dict[Watcher, Parts] = {}
-        self._drawn_s = 0.0
+        self._drawn: dict[tuple[Watcher, CellChoice], Parts] = {}
+        self._drawn_s, self._is_old = 0.0, False
+        self._groups = {
+            group: tuple(name for name in self.boards if _is_in(name, words, self.boards))
+            for group, words in (groups or {}).items()
+        }
+        self._reads = asyncio.Semaphore(READS_AT_ONCE)
+        self.has_plans = False
 
     # What happens of itself.
 
     async def run(self) -> None:
         """Look at cells, and tell jobs whether their tablet is heard, until cancelled."""
         for board in self.boards.values():
-            self.spawn(self.read_standing(board))
-        copies = asyncio.ensure_future(self._copy_to_the_plant())
+            self.spawn(self._read_in_turn(board))
+        beside = [
+            asyncio.ensure_future(work) for work in (self._copy_to_the_plant(), self._read_plans())
+        ]
         try:
             while True:
                 now_s = time.monotonic()
@@ -136,21 +172,39 @@ class Hub:
                     self._tend(board, now_s)
                 await asyncio.sleep(ALIVE_S)
         finally:
-            copies.cancel()
+            for task in beside:
+                task.cancel()
 
     async def _copy_to_the_plant(self) -> None:
         while True:
             await asyncio.to_thread(copy_journals_in_use)
             await asyncio.sleep(PLANT_S)
 
+    async def _read_plans(self) -> None:
+        """Read which plan waits for a person at which cell, while a page is open."""
+        while True:
+            if self.lives:
+                with suppress(RobolinkError, OSError):  # the job itself says what is wrong
+                    self._offer(await asyncio.to_thread(due_at_cells, self._plant))
+            await asyncio.sleep(RECORD_S if self.lives else ALIVE_S)
+
+    def _offer(self, planned: Mapping[str, PlannedJob]) -> None:
+        for board in self.boards.values():
+            cell = board.cell.configured
+            at_home = cell is None or cell.home.refusal() is None
+            if board.planned != (now := planned.get(board.name) if at_home else None):
+                board.planned = now
+                board.renew()
+
     def _tend(self, board: Board, now_s: float) -> None:
         job = board.job
-        shown = any(live.cell in ("", board.name) for live in self.lives)
+        shown = any(live.follows(board.name) for live in self.lives)
         if board.cameras and now_s - board.camera_s >= READ_S and self._is_open(board):
             board.camera_s = now_s
             self.spawn(self._read_camera(board))
-        if shown and now_s - board.record_s >= RECORD_S:
-            self.spawn(self.read_standing(board))
+        if shown and now_s - board.record_s >= self._record_s:
+            board.record_s = now_s
+            self.spawn(self._read_in_turn(board))
         if job is None:
             if board.watch.is_due(now_s, wanted=board.opened):
                 board.opened = False
@@ -174,7 +228,17 @@ class Hub:
     def _language_at(self, cell: str) -> str:
         """Return the language of who looks at a cell, else of who looks at all."""
         pages = sorted(self.lives, key=lambda live: live.cell == cell, reverse=True)
-        return next((live.watcher().language for live in pages if live.cell in ("", cell)), ENGLISH)
+        return next((live.watcher().language for live in pages if live.follows(cell)), ENGLISH)
+
+    @property
+    def _record_s(self) -> float:
+        """Interval in s at which a record is read anew: longer, the more there are."""
+        return RECORD_S * max(1.0, len(self.boards) / MANY_CELLS)
+
+    async def _read_in_turn(self, board: Board) -> None:
+        """Read a record that nobody waits for; few at the same time."""
+        async with self._reads:
+            await self.read_standing(board)
 
     async def read_standing(self, board: Board) -> None:
         """Read what is on record of a cell."""
@@ -212,13 +276,15 @@ class Hub:
         who: str,
         values: Mapping[str, str],
         station: tuple[str, int] | None = None,
-        recipe: str = "",
+        subject: str = "",
     ) -> None:
         """Begin a job on a cell that has none.
 
         Raises:
             OSError: It cannot be started.
         """
+        if kind.of_plan:
+            values = {**values, "--plant": self._plant}
         job = PanelJob(
             board.name,
             kind,
@@ -227,7 +293,7 @@ class Hub:
             changed=board.renew,
             values=values,
             station=station,
-            recipe=recipe,
+            subject=subject,
         )
         board.next_numbers()
         board.job, board.said = job, ()
@@ -257,9 +323,15 @@ class Hub:
     # Pages.
 
     def _changed(self, board: Board) -> None:
-        self._drawn.clear()
+        self._is_old = True
         for live in self.lives:
-            if live.cell in ("", board.name):
+            if live.follows(board.name):
+                live.news.set()
+
+    def plans_changed(self) -> None:
+        """Draw the pages of plans anew: something was heard of them."""
+        for live in self.lives:
+            if live.draw is not None:
                 live.news.set()
 
     def everything_changed(self, tablet: str = "") -> None:
@@ -304,8 +376,10 @@ class Hub:
         board = self.boards.get(live.cell)
         if board is not None:
             parts, number = board.parts(self.pages, watcher, now_s), board.number
+        elif live.draw is not None:
+            parts, number = live.draw(watcher, now_s), 0
         else:
-            parts, number = self.overview(watcher, now_s), 0
+            parts, number = self.overview(watcher, now_s, live.choice), 0
         named = parts.named()
         changed = {name: text for name, text in named.items() if live.shown.get(name) != text}
         if not changed and live.screen == (parts.screen, number):
@@ -313,23 +387,50 @@ class Hub:
         live.shown, live.screen = named, (parts.screen, number)
         return {"t": "screen", "screen": parts.screen, "number": number, "parts": changed}
 
-    def overview(self, watcher: Watcher, now_s: float) -> Parts:
-        """Return the parts that show all cells."""
-        if now_s - self._drawn_s > OVERVIEW_S:
+    def overview(self, watcher: Watcher, now_s: float, choice: CellChoice = ALL_CELLS) -> Parts:
+        """Return the parts that show all cells.
+
+        Args:
+            watcher: Who looks.
+            now_s: The time, monotonic.
+            choice: Which cells.
+        """
+        least_s = AGAIN_S if self._is_old and len(self.boards) > MANY_CELLS else OVERVIEW_S
+        if now_s - self._drawn_s > least_s or (self._is_old and len(self.boards) <= MANY_CELLS):
             self._drawn.clear()
-            self._drawn_s = now_s
-        found = self._drawn.get(watcher)
+            self._drawn_s, self._is_old = now_s, False
+        found = self._drawn.get((watcher, choice))
         if found is None:
-            found = self._drawn[watcher] = self.pages.overview(self.cards(watcher, now_s), watcher)
+            found = self._drawn[watcher, choice] = self._overview(watcher, now_s, choice)
         return found
 
-    def cards(self, watcher: Watcher, now_s: float) -> list[CellCard]:
-        """Return what the overview shows of each cell."""
+    def _overview(self, watcher: Watcher, now_s: float, choice: CellChoice) -> Parts:
         with speaking_in(watcher.language):
-            return [
-                board.card(watcher, now_s, seat=self._who(board.name))
-                for board in self.boards.values()
-            ]
+            names = self._groups.get(choice.group, ()) if choice.group else tuple(self.boards)
+            signs = {name: self.boards[name].sign(now_s) for name in names}
+            found = [name for name in names if choice.sign in ("", signs[name])]
+            pages = max(1, -(-len(found) // A_PAGE))
+            choice = replace(choice, page=min(max(choice.page, 1), pages))
+            first = (choice.page - 1) * A_PAGE
+            shown = [] if choice.groups else found[first : first + A_PAGE]
+            bar = CellsBar(
+                choice,
+                len(names),
+                _counted(signs.values()),
+                len(found),
+                1 if choice.groups else pages,
+                self._group_cards(signs) if choice.groups else (),
+                bool(self._groups),
+                self.has_plans,
+            )
+            cards = [self.boards[name].card(watcher, now_s, seat=self._who(name)) for name in shown]
+            return self.pages.overview(cards, watcher, bar)
+
+    def _group_cards(self, signs: Mapping[str, str]) -> tuple[GroupCard, ...]:
+        return tuple(
+            GroupCard(group, len(names), _counted(signs[name] for name in names))
+            for group, names in self._groups.items()
+        )
 
     def _who(self, cell: str) -> str:
         holder = self._seats.holder(cell)
@@ -344,6 +445,17 @@ class Hub:
         camera = board.camera if board is not None else None
         look_ms = None if camera is None else round(camera.age_s() * 1000)
         return {"t": "beat", "age_ms": age_ms, "look_ms": look_ms, "status": status}
+
+
+def _counted(signs: Iterable[str]) -> dict[str, int]:
+    """Return how many cells have each sign that one has, the most urgent first."""
+    counts = Counter(signs)
+    return {sign: counts[sign] for sign in SIGNS if counts[sign]}
+
+
+def _is_in(name: str, words: Sequence[str], names: Iterable[str]) -> bool:
+    """Return whether the words of a group name a cell; ``names`` are those of all cells."""
+    return any(word == name or (word not in names and fnmatchcase(name, word)) for word in words)
 
 
 def keys_of(cell: PanelCell) -> frozenset[str]:

@@ -53,6 +53,7 @@ class JobKind:
         values: The options that may go with it, and for each the option of the command.
         of_station: Whether it is about one station of the cell, which the press names.
         of_recipe: Whether it follows a recipe, which the press may name.
+        of_plan: Whether it is the job of a plan, which the press names.
     """
 
     name: str
@@ -62,11 +63,13 @@ class JobKind:
     values: Mapping[str, str] = field(default_factory=dict)
     of_station: bool = False
     of_recipe: bool = False
+    of_plan: bool = False
 
 
 KINDS: Final = {
     kind.name: kind
     for kind in (
+        JobKind("plan", TITLES["plan"], ("fleet", "next"), of_plan=True),
         JobKind("change", TITLES["change"], ("change",), of_recipe=True),
         JobKind("recover", TITLES["recover"], ("recover",)),
         JobKind("release", TITLES["release"], ("robot", "release")),
@@ -115,7 +118,7 @@ class PanelJob:
         changed: Called when there is something new to show.
         values: What goes with the command: options, and their values.
         station: Whose place is found, and with which tool; ``None`` where it is about no station.
-        recipe: File of the recipe; empty where the job lets the person choose.
+        subject: File of the recipe, or id of the plan; empty where the job lets the person choose.
 
     Attributes:
         view: What it shows; ``None`` before it has shown anything.
@@ -137,12 +140,12 @@ class PanelJob:
         changed: Callable[[], None],
         values: Mapping[str, str] | None = None,
         station: tuple[str, int] | None = None,
-        recipe: str = "",
+        subject: str = "",
     ) -> None:
         self.cell, self.kind, self.language, self.who = cell, kind, language, who
         self._changed = changed
         self._values = dict(values or {})
-        self._station, self._recipe = station, recipe
+        self._station, self._subject = station, subject
         self.view: View | None = None
         self.view_s = time.monotonic()
         self.told: deque[str] = deque(maxlen=_MOST_TOLD)
@@ -168,8 +171,8 @@ class PanelJob:
         if self._station is not None:
             name, tool = self._station
             given += ["--tool", str(tool), "--", name]
-        elif self._recipe:
-            given += ["--", self._recipe]
+        elif self._subject:
+            given += ["--", self._subject]
         return ["-c", self.cell, *who, *self.kind.words, *given]
 
     async def start(self) -> None:

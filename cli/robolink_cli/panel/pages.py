@@ -19,7 +19,7 @@ from robolink.report import look_markup
 from robolink.report._markup import shown
 from robolink_cli.panel import drawings
 from robolink_cli.panel.camera import OLD_S, CameraLook
-from robolink_cli.panel.cards import CellCard
+from robolink_cli.panel.cards import CellCard, CellsBar
 from robolink_cli.wizard.views.records import (
     Action,
     CheckView,
@@ -41,8 +41,11 @@ HERE: Final = "here"
 
 ONLOOKER: Final = "onlooker"
 
-PAGES: Final = ("cell", "overview", "history", "login", "pairing")
+PAGES: Final = ("cell", "overview", "history", "login", "pairing", "plans", "plan", "decision")
 """Whole pages."""
+
+_LIVE: Final = ("cell", "overview", "plans", "plan")
+"""Those that follow what happens, by a stream."""
 
 HELD_UP_TO_MM: Final = 0.5
 """Longest step, mm or degrees, that a held key repeats; longer ones are single taps."""
@@ -171,9 +174,27 @@ class Pages:
         main = f'<div class="beside"><div class="own">{parts.main}</div>{figure}</div>'
         return replace(parts, main=main)
 
-    def overview(self, cells: Sequence[CellCard], watcher: Watcher) -> Parts:
-        """Return the parts that show all cells."""
-        return self._parts("overview", watcher, cells=cells, cell="")
+    def overview(
+        self, cells: Sequence[CellCard], watcher: Watcher, bar: CellsBar | None = None
+    ) -> Parts:
+        """Return the parts that show all cells.
+
+        Args:
+            cells: The cells.
+            watcher: Who looks.
+            bar: What stands above and below them; ``None`` for nothing.
+        """
+        return self._parts("overview", watcher, cells=cells, bar=bar, cell="")
+
+    def of_plans(self, kind: str, sight: object, watcher: Watcher) -> Parts:
+        """Return the parts that show plans.
+
+        Args:
+            kind: ``plans`` or ``plan``.
+            sight: What they show: a record of :mod:`robolink_cli.panel.plant.plan_cards`.
+            watcher: Who looks.
+        """
+        return self._parts(kind, watcher, sight=sight, cell="")
 
     def page(self, kind: str, watcher: Watcher, **data: Any) -> str:  # noqa: ANN401 - of the page
         """Return a whole page.
@@ -185,7 +206,9 @@ class Pages:
                 (:class:`Parts`) and ``number``; ``overview``: ``cells``
                 (:class:`~robolink_cli.panel.cards.CellCard`); ``history``: ``cell``,
                 ``changes``, ``charts`` and ``simulated``; ``login`` and ``pairing``: ``names``,
-                and ``onward``, the page that follows.
+                and ``onward``, the page that follows; ``plans`` and ``plan``: ``parts``;
+                ``decision``: ``sight``, ``resumes`` and ``onward``. ``query`` is what its stream
+                is asked for besides the cell.
 
         Raises:
             KeyError: There is no such kind.
@@ -200,12 +223,13 @@ class Pages:
             "names": (),
             "parts": None,
             "simulated": False,
+            "query": "",
         }
         given |= data
         given["onward"] = _inside(given["onward"])
         if kind == "overview" and given["parts"] is None:
             given["parts"] = self.overview(given["cells"], watcher)
-        live = kind in ("cell", "overview")
+        live = kind in _LIVE
         if not live:
             parts = self._parts(kind, watcher, **given)
             given["parts"] = parts

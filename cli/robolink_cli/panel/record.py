@@ -78,6 +78,11 @@ class Standing:
     newest: int = 0
     simulated: bool = False
 
+    @property
+    def is_open(self) -> bool:
+        """Whether somebody must see to something: :meth:`lines` says to what."""
+        return bool(self.interrupted) or self.stopped is not None
+
     def lines(self) -> tuple[str, ...]:
         """Return what somebody must see to, in sentences, in the language that is spoken."""
         told = [

@@ -6,7 +6,7 @@ import socket
 import ssl
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +22,8 @@ from robolink_cli.panel.guard.connections import Connections, listening
 from robolink_cli.panel.guard.gate import guarded
 from robolink_cli.panel.hub import Hub
 from robolink_cli.panel.pages import Pages
+from robolink_cli.panel.plant.desk import PlantDesk
+from robolink_cli.panel.plant.line_orders import LineOrders
 from robolink_cli.panel.stop import StopDesk, StopProcess
 from robolink_cli.panel.tastes import Tastes
 from robolink_cli.panel.words import speak_several_languages
@@ -70,14 +72,18 @@ class Served:
         people: Of each cell the people of the cell file; ``None`` where that names none.
         names: By which names it may be opened, besides its address: those of its certificate.
         audit: Where it is put on record; ``None`` for nowhere.
+        groups: The words of each group of the cell files.
         language: Of a tablet that has not chosen one.
+        plant: Id of the plant whose plans people carry out here.
     """
 
     cells: tuple[PanelCell, ...]
     people: Mapping[str, People | None]
     names: Collection[str] = ()
     audit: Notes | None = None
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
     language: str = ENGLISH
+    plant: str = "plant"
 
 
 async def serve(
@@ -108,10 +114,15 @@ async def serve(
             speaking=tastes.speaking,
         )
         access.connections = connections
-        hub = Hub(served.cells, Pages(), access.seats, access.audit.note)
-        panel = Panel(hub, StopDesk(carry_out), access, tastes)
+        # Each has its own thread: what line computers post holds up no halt of an engineer.
+        looking, ordering, lines = PlantDesk(), PlantDesk(), PlantDesk()
+        note = access.audit.note
+        hub = Hub(served.cells, Pages(), access.seats, note, served.groups, plant=served.plant)
+        panel = Panel(hub, StopDesk(carry_out), access, tastes, looking=looking, ordering=ordering)
+        configured = {cell.name: cell.configured for cell in served.cells}
+        orders = LineOrders(lines, configured, served.groups, note)
         config = uvicorn.Config(
-            guarded(panel.application(), access),
+            guarded(panel.application(), access, orders),
             lifespan="on",
             log_config=None,
             date_header=False,
@@ -136,6 +147,8 @@ async def serve(
             server.should_exit = True
             await serving
             access.close()
+            for desk in (looking, ordering, lines):
+                desk.close()
 
 
 def _listening(place: PanelPlace, connections: Connections) -> socket.socket:

@@ -178,6 +178,22 @@ async def _looked(cell: str, language: str) -> CellLook:
     return CellLook(now_s, at, read=said, language=language)
 
 
+def mark_of(watch: CellWatch, standing: Standing, now_s: float) -> str:
+    """Return the mark of a cell on which no job runs: ``ok``, ``look``, ``bad`` or ``unknown``.
+
+    Args:
+        watch: What was seen of it.
+        standing: What is on record of it.
+        now_s: The time, monotonic.
+    """
+    look = watch.look
+    if look is None or look.failed or now_s - look.taken_s >= STALE_AFTER_S:
+        return "unknown"
+    mark = _mark(look)
+    # What is open counts however the controller stands.
+    return "look" if mark == "ok" and (standing.is_open or standing.unusual) else mark
+
+
 def card_of(
     watch: CellWatch,
     standing: Standing,
@@ -205,18 +221,13 @@ def card_of(
     else:
         card = replace(
             card,
-            mark=_mark(look) if now_s - look.taken_s < STALE_AFTER_S else "unknown",
             word=state_word(look.state) if look.state else tr("not read"),
             lines=_read(look, now_s),
             read=True,
             simulated=simulated or look.simulated is True,
         )
+    card = replace(card, mark=mark_of(watch, standing, now_s))
     lines = standing.lines()
-    if lines:
-        # What is open counts however the controller stands.
-        card = replace(card, mark="look" if card.mark == "ok" else card.mark)
-    if standing.unusual and card.mark == "ok":
-        card = replace(card, mark="look")
     # Of what the last job left the first line tells how it ended; the rest stands below.
     head, _, _ = "\n".join(said).partition("\n")
     shown = (*lines, *((head,) if head else ()), *card.lines, *standing.past())

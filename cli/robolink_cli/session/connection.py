@@ -13,7 +13,9 @@ from robolink.errors import (
     ConfigError,
     ConnectError,
     ControllerError,
+    JournalError,
     LoginUnansweredError,
+    NotAtHomeError,
     OutcomeUnknownError,
     RobolinkError,
 )
@@ -82,13 +84,20 @@ def open_controller(
             not the cell's.
         ConnectError: It is not reached.
         LoginRefusedError: Wrong or missing password.
+        NotAtHomeError: The home of the cell is another computer, and the command does not only
+            look or calm; nothing was connected.
         OutcomeUnknownError: An earlier job is unfinished, and there is a ``job``.
         StoppedError: A stop came, at the end or before.
     """
+    from robolink.journal import require_home
+    from robolink.transport import parse_url
+
     url = context.require_url()
     unhindered = looks or calms
-    if context.doubt is not None and not unhindered:
-        raise context.doubt
+    if not unhindered:
+        if context.doubt is not None:
+            raise context.doubt
+        require_home(parse_url(url).address)
     password = password_of(context)
     _let_a_check_end(url)
     signature = replace(
@@ -226,7 +235,7 @@ def _saying_what_is_left(
         note_unsettled(controller, [m for m in left if m.operation not in known], named)
         if trouble is not None:
             # After the work, so that no message of the journal comes before the result.
-            note(joined(" ", (trouble.what, _unrecorded())))
+            note(joined(" ", (trouble.what, _unrecorded(trouble))))
 
 
 def _record_for_nobody(controller: "Controller") -> None:
@@ -292,7 +301,9 @@ def _check_robot(controller: "Controller", cell: "Expected", *, looks: bool) -> 
         note(str(error))
 
 
-def _unrecorded() -> str:
+def _unrecorded(trouble: ConfigError) -> str:
+    if isinstance(trouble, NotAtHomeError):
+        return tr("Its journal is there: unfinished jobs may be missing here.")
     return tr(
         "Unfinished jobs may be missing here, and robolink changes nothing until the "
         "journal is repaired."
@@ -301,8 +312,6 @@ def _unrecorded() -> str:
 
 def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, ...]":
     """Return the unfinished jobs; a journal that broke meanwhile does not prevent reading."""
-    from robolink.errors import JournalError
-
     try:
         return controller.outcomes.open_markers()
     except JournalError as error:

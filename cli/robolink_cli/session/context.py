@@ -162,6 +162,7 @@ _JOBS: Final = {
     "check": declared("Check the cell"),
     "jog": declared("Jog"),
     "learn": declared("Learn a station"),
+    "next": declared("Change needle"),
     "recover": declared("Recover"),
     "release": declared("Release the stop"),
     "reset": declared("Reset"),
@@ -241,7 +242,7 @@ def _looking_context_from(given: Mapping[str, Any]) -> CliContext:
     reach = glance_at_cell(name)
     if reach is None:
         return _calming_context_from(given)
-    _use_journal(reach)
+    _use_journal(name, reach)
     said = {"timeout_s": reach.timeout_s} if reach.timeout_s else {}
     return CliContext(**{**said, **given, "url": reach.url, "reach": reach})
 
@@ -259,18 +260,19 @@ def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
             reach = reach_cell(name)
         except ConfigError:
             raise error from None
-        _use_journal(reach)
+        _use_journal(name, reach)
         note(reach.doubt or error.what)
         return CliContext(**{**given, "url": reach.url, "doubt": error, "reach": reach})
 
 
-def _use_journal(reach: "Reach") -> None:
-    if reach.journal:
-        from robolink.journal import name_journals
+def _use_journal(name: str, reach: "Reach") -> None:
+    if reach.journal or reach.home:
+        from robolink.journal import CellHome, name_journals
         from robolink.transport import parse_url
 
-        places = {parse_url(reach.url).address: reach.journal, "": reach.journal}
-        name_journals(places, afresh=True)
+        address = parse_url(reach.url).address
+        places = {address: reach.journal, "": reach.journal}
+        name_journals(places, homes={address: CellHome(name, reach.home)}, afresh=True)
 
 
 T = TypeVar("T")

@@ -27,7 +27,7 @@ def listening_for_stop(
     A simulator inside this process is nobody else's to stop. A command that looks or calms is
     found by its address alone: it does not wait for the journal, which knows the name.
     """
-    from robolink.stopping import StopListener
+    from robolink.stopping import StopListener, no_place_to_listen
 
     url = context.require_url()
     if "+sim://" in url:
@@ -48,12 +48,7 @@ def listening_for_stop(
             seen=None if looks else lambda: _last_seen(controller),
         )
     except OSError as error:
-        note(
-            tr(
-                "'robolink stop' in another terminal cannot reach this command: {cause}.",
-                cause=error.strerror or error,
-            )
-        )
+        note(no_place_to_listen(error))
         yield
         return
     with listener:
@@ -86,6 +81,7 @@ def remember_address(context: "CliContext", proof: str | None = None) -> None:
             password_env=settings.password_env or "",
             timeout_s=settings.timeout_s or 0.0,
             journal=settings.journal or "",
+            home=settings.home or "",
             proof=proof_of_files() if proof is None else proof,
             expected=context.cell.expected,
         ),

@@ -1,15 +1,17 @@
 """Plans of many cells, their jobs, halts and permits: for people and as JSON."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from robolink.fleet import (
     CellJob,
+    CellState,
     Halt,
     JobState,
     Permit,
     PlanOverview,
     PlanProgress,
+    PlantHome,
     WaitReason,
     state_in_words,
     wait_in_words,
@@ -21,6 +23,14 @@ from robolink_cli.console.render import say, say_listed, table
 
 _FOR_A_PERSON: Final = (JobState.UNSETTLED, JobState.REFUSED, JobState.MISSED)
 _MOST_LISTED: Final = 20
+_SHOWN_DIGITS: Final = 12
+
+
+def halts_in_words(halts: Sequence[Halt]) -> list[str]:
+    """Return a line for each of several halts, with its number; one alone needs none."""
+    if len(halts) == 1:
+        return [halts[0].sentence]
+    return [tr("halt {number}: {why}", number=halt.number, why=halt.sentence) for halt in halts]
 
 
 def halt_payload(halt: Halt) -> dict[str, object]:
@@ -50,9 +60,21 @@ def permit_payload(permit: Permit) -> dict[str, object]:
     }
 
 
-def plans_payload(overviews: Iterable[PlanOverview]) -> dict[str, object]:
-    """Return plans in a line each, as plain JSON."""
+def home_payload(home: PlantHome) -> dict[str, object]:
+    """Return a home as plain JSON."""
     return {
+        **json_fields(home, "plant", "home"),
+        "heard_at": home.heard_at or None,
+        "agent": home.agent or None,
+    }
+
+
+def plans_payload(
+    overviews: Iterable[PlanOverview], homes: Iterable[PlantHome] = ()
+) -> dict[str, object]:
+    """Return plans in a line each, and the homes whose agents were heard, as plain JSON."""
+    return {
+        "homes": [home_payload(home) for home in homes],
         "plans": [
             {
                 "plan": one.plan.id,
@@ -61,16 +83,16 @@ def plans_payload(overviews: Iterable[PlanOverview]) -> dict[str, object]:
                 "cell_count": len(one.plan.cells),
                 "finished": one.finished,
                 "cancelled_at": one.cancelled_at or None,
-                "states": _states(one.counts),
+                "states": states_payload(one.counts),
                 "halts": [halt_payload(halt) for halt in one.standing],
             }
             for one in overviews
-        ]
+        ],
     }
 
 
-def show_plans(overviews: Iterable[PlanOverview]) -> None:
-    """Print a line a plan."""
+def show_plans(overviews: Iterable[PlanOverview], homes: Iterable[PlantHome] = ()) -> None:
+    """Print a line a plan, and a line a home."""
     rows = [
         (
             one.plan.id,
@@ -85,6 +107,9 @@ def show_plans(overviews: Iterable[PlanOverview]) -> None:
         say(tr("No plan was made yet: robolink fleet plan FILE"))
         return
     table(tr("Plans"), (tr("plan"), tr("kind"), tr("made"), tr("jobs"), ""), rows)
+    heard = [(one.home, one.plant, local_label(one.heard_at), one.agent) for one in homes]
+    if heard:
+        table(tr("Homes"), (tr("home"), tr("plant"), tr("last heard"), tr("agent")), heard)
 
 
 def _standing(one: PlanOverview) -> str:
@@ -106,9 +131,10 @@ def progress_payload(progress: PlanProgress) -> dict[str, object]:
         "recipe_hash": plan.recipe_hash or None,
         "finished": progress.finished,
         "cancelled_at": progress.cancelled_at or None,
-        "states": _states(progress.counts()),
-        "rings": [_states(ring) for ring in progress.rings()],
+        "states": states_payload(progress.counts()),
+        "rings": [states_payload(ring) for ring in progress.rings()],
         "halts": [halt_payload(halt) for halt in progress.halts],
+        "homes": [home_payload(home) for home in progress.homes.values()],
         "jobs": [_job(progress, job) for job in progress.jobs],
     }
 
@@ -119,9 +145,10 @@ def job_payload(progress: PlanProgress, job: CellJob) -> dict[str, object]:
 
 
 def _job(progress: PlanProgress, job: CellJob) -> dict[str, object]:
-    why = progress.why(job)
+    why, home = progress.why(job), progress.home_of(job.cell)
     return {
         "cell": job.cell,
+        "home": None if home is None else home.home,
         "order": job.order,
         "ring": job.ring + 1,
         "state": str(job.state),
@@ -134,6 +161,7 @@ def _job(progress: PlanProgress, job: CellJob) -> dict[str, object]:
         "reason": job.reason or None,
         "what": job.what or None,
         "change": job.change or None,
+        "proof": job.proof or None,
     }
 
 
@@ -152,8 +180,12 @@ def show_progress(progress: PlanProgress) -> None:
     for why in WaitReason:
         if waits[why]:
             say(tr("{count} waiting: {why}", count=waits[why], why=wait_in_words(why)))
-    for halt in progress.standing:
-        say(halt.sentence)
+    for home in progress.homes_left():
+        say(f"  {_home(home)}")
+    if plan.kind.moves:
+        _show_cells(progress)
+    for shown in halts_in_words(progress.standing):
+        say(shown)
     if progress.standing and not progress.cancelled_at:
         say(tr("To go on: robolink fleet resume {plan} --reason WHY", plan=plan.id))
     left = [job for job in progress.jobs if job.state in _FOR_A_PERSON]
@@ -162,6 +194,18 @@ def show_progress(progress: PlanProgress) -> None:
         say(f"  {job.cell}: {state_in_words(job.state)}{_what(job)}")
     if left[_MOST_LISTED:]:
         say(tr("  and {more} more; --json lists all.", more=len(left) - _MOST_LISTED))
+
+
+def _show_cells(progress: PlanProgress) -> None:
+    """Print at which cells a person is waited for, and since when others are at work."""
+    awaited = [job for job in progress.jobs if progress.why(job) is WaitReason.PERSON]
+    running = [job for job in progress.jobs if job.state is JobState.RUNNING]
+    for job in awaited[:_MOST_LISTED]:
+        say(f"  robolink -c {job.cell} fleet next {progress.plan.id}")
+    for job in running[:_MOST_LISTED]:
+        say(tr("  {cell}: running since {when}", cell=job.cell, when=local_label(job.begun_at)))
+    if more := len(awaited[_MOST_LISTED:]) + len(running[_MOST_LISTED:]):
+        say(tr("  and {more} more; --json lists all.", more=more))
 
 
 def show_job(progress: PlanProgress, job: CellJob) -> None:
@@ -173,8 +217,13 @@ def show_job(progress: PlanProgress, job: CellJob) -> None:
         tr("ring"): str(job.ring + 1),
         tr("state"): state_in_words(job.state),
     }
+    if job.proof:
+        said[tr("confirmed by")] = tr("turn test, entry {number}", number=job.proof)
     if why is not None:
         said[tr("waits for")] = wait_in_words(why)
+    home = progress.home_of(job.cell)
+    if home is not None:
+        said[tr("home")] = _home(home)
     if job.begun_at:
         said[tr("attempt")] = f"{job.attempt}, {local_label(job.begun_at)}"
     if job.code is not None:
@@ -184,14 +233,53 @@ def show_job(progress: PlanProgress, job: CellJob) -> None:
         say(halt.sentence)
 
 
+def _home(home: PlantHome) -> str:
+    """Return a home, and when its agent was heard last."""
+    if not home.heard_at:
+        return tr("{home}: its agent was never heard", home=home.home)
+    return tr(
+        "{home}: its agent was heard last {when}", home=home.home, when=local_label(home.heard_at)
+    )
+
+
 def _what(job: CellJob) -> str:
     told = " ".join(filter(None, (job.error, f"({job.reason})" if job.reason else "", job.what)))
     return f": {told}" if told else ""
 
 
-def _states(counts: Mapping[JobState, int]) -> dict[str, int]:
+def states_payload(counts: Mapping[JobState, int]) -> dict[str, int]:
+    """Return how many jobs are in each state, all states named, as plain JSON."""
     return {str(state): counts.get(state, 0) for state in JobState}
 
 
 def _counted(counts: Mapping[JobState, int]) -> str:
     return ", ".join(f"{counts[state]} {state}" for state in JobState if counts.get(state))
+
+
+def cells_payload(plant: str, cells: Mapping[str, CellState]) -> dict[str, object]:
+    """Return how cells stand by their records as plain JSON."""
+    return {"plant": plant, "cells": [state.as_json(name) for name, state in cells.items()]}
+
+
+def show_cells(cells: Mapping[str, CellState]) -> None:
+    """Print a line a cell: what is unfinished, its recipe, its last check."""
+    if not cells:
+        say(tr("Nothing was noted of any cell yet: an agent does that (robolink fleet agent)."))
+        return
+    columns = (tr("cell"), tr("recipe"), tr("since"), tr("last check"), tr("noted"), "")
+    table(tr("Cells"), columns, [_cell_row(name, state) for name, state in cells.items()])
+
+
+def _cell_row(name: str, state: CellState) -> tuple[str, ...]:
+    recipe = state.recipe
+    unfinished = ""
+    if state.unsettled_since:
+        unfinished = tr("unfinished since {when}", when=local_label(state.unsettled_since))
+    return (
+        name,
+        f"{recipe.name} {recipe.hash[:_SHOWN_DIGITS]}" if recipe else "",
+        local_label(recipe.since)[:10] if recipe else "",
+        local_label(state.checked_at)[:16] if state.checked_at else "",
+        local_label(state.noted_at)[:16],
+        unfinished or (state.verdict if state.well is False else ""),
+    )

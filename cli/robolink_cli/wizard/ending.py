@@ -84,7 +84,7 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
     if error is None:
         if state.report is None:
             return None
-        lines = done_lines(state, state.report)
+        lines = [*done_lines(state, state.report), *state.closing]
         done = tr("DONE")
         return LastScreen(True, tuple(lines), (_head(state, done), *lines), at_s, done)
     begun = state.subject is not None
@@ -94,8 +94,8 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
     if not begun or left or state.free_jog is not None or not isinstance(error, RobolinkError):
         return None
     headed = headed_of(state, error)
-    kept = (_head(state, headed), *_where(state), *_next(state, error))
-    said = tuple(stopped_lines(state, error))
+    kept = (_head(state, headed), *_where(state), *_next(state, error), *state.closing)
+    said = (*stopped_lines(state, error), *state.closing)
     blocked = is_blocked(error)
     return LastScreen(False, said, kept, at_s, headed, again=not blocked, blocked=blocked)
 
@@ -115,11 +115,9 @@ def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
 
 def kept_lines(state: WizardState, error: BaseException | None) -> list[str]:
     """Return what stays on the terminal when no last screen was shown."""
-    if error is None:
-        return []
-    if state.subject is None:
-        return []
-    return [_head(state, headed_of(state, error)), *_where(state)]
+    if error is None or state.subject is None:
+        return [*state.closing]
+    return [_head(state, headed_of(state, error)), *_where(state), *state.closing]
 
 
 def _head(state: WizardState, ended: str) -> str:

@@ -29,6 +29,7 @@ from robolink_cli.wizard.happenings import (
     OffersAtTheEnd,
     Pressed,
     Reading,
+    SaidAtTheEnd,
     SendAnswer,
     TaughtPoints,
     TooFast,
@@ -125,6 +126,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return replace(state, held_back=subject.why)
     if isinstance(subject, OffersAtTheEnd):
         return replace(state, offers=subject.offers)
+    if isinstance(subject, SaidAtTheEnd):
+        return replace(state, closing=(*state.closing, subject.text))
     if isinstance(subject, TaughtPoints):
         return replace(state, impact=subject.impact)
     if isinstance(subject, ChangeReport):

@@ -232,4 +232,15 @@ class OffersAtTheEnd:
     offers: frozenset[WizardCommand]
 
 
+@dataclass(frozen=True, slots=True)
+class SaidAtTheEnd:
+    """What the last screen says besides, and what stays when it is gone.
+
+    Attributes:
+        text: That.
+    """
+
+    text: str
+
+
 Effect = SendAnswer | WizardCommand

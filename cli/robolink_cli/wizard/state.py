@@ -253,6 +253,7 @@ class WizardState:
         report: What was reached, ``None`` before the end.
         ended: The last screen, ``None`` before it.
         offers: What the last screen offers beside leaving it, where the job was carried out.
+        closing: What it says besides how the job ended.
         wants: What the person chose there; ``None`` for leaving, and before.
         asked: Number of the last question, 0 before the first.
         held_back: What keeps the next movement from beginning; empty for nothing.
@@ -283,6 +284,7 @@ class WizardState:
     report: ChangeReport | None = None
     ended: LastScreen | None = None
     offers: frozenset[WizardCommand] = frozenset()
+    closing: tuple[str, ...] = ()
     wants: WizardCommand | None = None
     asked: int = 0
     held_back: str = ""

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from datetime import datetime
 
+from robolink.errors import BusyError
 from robolink.fleet.errors import PlanError
 from robolink.fleet.halts import (
     EndedJob,
@@ -15,18 +16,28 @@ from robolink.fleet.halts import (
 )
 from robolink.fleet.outcome_codes import MOST_TRIES, Treatment
 from robolink.fleet.plans import Plan
-from robolink.fleet.progress import CellJob, Halt, JobOutcome, RecordedOutcome, WaitFacts
+from robolink.fleet.progress import (
+    CellJob,
+    Halt,
+    JobOutcome,
+    PlanProgress,
+    RecordedOutcome,
+    WaitFacts,
+)
 from robolink.fleet.states import JobState, PlanKind
 from robolink.fleet.store import statements
+from robolink.fleet.store.homes import cells_away, homes_of_plan
 from robolink.fleet.store.rows import (
     accepted_in,
     evidence_in,
     label_of,
+    plan_in,
     read_halt,
     read_job,
     read_permit,
 )
 from robolink.fleet.windows import Window
+from robolink.journal import computer_key
 from robolink.journal.store.chain import canonical, storable
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.messages import known_names, tr
@@ -40,18 +51,25 @@ class PlanCourse:
         now: The time, with its zone.
         label: The same as it is stored.
         cancelled: Whether the plan was cancelled.
+        bound_to: The computer that carries it out, where its cells name no home and one has begun.
 
     Args:
         database: The connection, within the transaction.
         plan: The plan.
         now: The time.
         cancelled: Whether the plan was cancelled.
+        bound_to: That computer; empty for none.
     """
 
     def __init__(
-        self, database: DatabaseConnection, plan: Plan, now: datetime, cancelled: bool = False
+        self,
+        database: DatabaseConnection,
+        plan: Plan,
+        now: datetime,
+        cancelled: bool = False,
+        bound_to: str = "",
     ) -> None:
-        self._database, self.cancelled = database, cancelled
+        self._database, self.cancelled, self.bound_to = database, cancelled, bound_to
         self.plan, self.now, self.label = plan, now, label_of(now)
 
     def job(self, cell: str) -> CellJob:
@@ -68,11 +86,51 @@ class PlanCourse:
             remedy=known_names(self.plan.cells, cell),
         )
 
-    def facts(self, busy: frozenset[str]) -> WaitFacts:
+    def is_at_home(self, cell: str, computer: str) -> bool:
+        """Return whether a computer carries out the job of a cell.
+
+        Args:
+            cell: The cell.
+            computer: Name of the computer.
+        """
+        home = self.plan.homes.get(cell) or self.bound_to
+        return not home or computer_key(home) == computer_key(computer)
+
+    def bind(self, computer: str) -> None:
+        """Have a plan whose cells name no home carried out by one computer, the first that begins.
+
+        Args:
+            computer: Its name.
+        """
+        if not (self.plan.homes or self.bound_to):
+            self._database.run(statements.BIND_PLAN, {"plan": self.plan.id, "home": computer})
+
+    def require_begun(self, job: CellJob, attempt: int) -> None:
+        """Refuse the outcome of an attempt that was never begun.
+
+        Args:
+            job: The job.
+            attempt: Number of the attempt.
+
+        Raises:
+            PlanError: It was not.
+        """
+        if attempt < 1 or attempt > job.attempt:
+            raise PlanError(
+                tr(
+                    "Attempt {attempt} of {order} was never begun.",
+                    attempt=attempt,
+                    order=job.order,
+                ),
+                remedy=tr("Begin a job before it is carried out."),
+            )
+
+    def facts(self, busy: frozenset[str], away: frozenset[str] = frozenset()) -> WaitFacts:
         """Return what holds the jobs back.
 
         Args:
             busy: Cells at which jobs of other plans run.
+            away: Cells at whose home no agent is heard.
         """
         standing = self.standing()
         ((ring,),) = self._database.rows(statements.OPEN_RING, {"plan": self.plan.id})
@@ -93,6 +151,7 @@ class PlanCourse:
             running=int(running),
             most=self.plan.most_at_once(ring),
             busy=busy,
+            away=away,
         )
 
     def miss(self) -> None:
@@ -125,6 +184,9 @@ class PlanCourse:
         """
         if self.cancelled and state is JobState.WAITING:
             state = JobState.CANCELLED  # it would wait for ever, and breaks no rule by that
+        # One that the plan itself held back was not tried in vain: no closed window ends it.
+        held_back = state is JobState.WAITING and outcome.error == BusyError.__name__
+        held_back = held_back and not self.facts(frozenset()).may_write
         end = EndedJob(state, treatment, outcome.corrections)
         counts = state.final and state is not JobState.CANCELLED
         judged = state.answered and end.judged
@@ -140,7 +202,7 @@ class PlanCourse:
             "reason": outcome.reason,
             "what": storable(outcome.what),
             "change": outcome.change,
-            "treatment": str(treatment),
+            "treatment": "" if held_back else str(treatment),
             "judged": int(judged),
             "corrections": canonical(corrections) if corrections else "",
             "sequence": sequence,
@@ -148,23 +210,58 @@ class PlanCourse:
         self._database.run(statements.END_JOB, values)
         cell = {"plant": self.plan.plant, "cell": job.cell, "order_id": self.plan.order(job.cell)}
         self._database.run(statements.FREE_CELL, cell)
+        if state.final:
+            self.tell_of(self.job(job.cell))
         halt = self._checked(job, end) if counts else None
         return RecordedOutcome(self.job(job.cell), halt)
+
+    def prove(self, cell: str, entry: int) -> CellJob | None:
+        """Store that a later turn test has confirmed what a job wrote without motion.
+
+        Args:
+            cell: The cell.
+            entry: Number of the test's entry in the cell's journal.
+
+        Returns:
+            The job; ``None`` where it does not wait for that.
+        """
+        values = {"plan": self.plan.id, "cell": cell, "proof": entry}
+        if not self._database.run(statements.PROVE_JOB, values):
+            return None
+        job = self.job(cell)
+        self.tell_of(job)
+        return job
+
+    def tell_of(self, job: CellJob) -> None:
+        """Add the end of a job to the events of the plant."""
+        said = ("cell", "order", "attempt", "ended_at", "code", "error", "reason", "change")
+        event = {name: getattr(job, name) for name in said}
+        self._tell("outcome", **event, state=str(job.state), proof=job.proof or None)
+
+    def _tell(self, event: str, **said: object) -> None:
+        """Add to the events of the plant, with what they are about: durable together."""
+        about = {"event": event, "plan": self.plan.id, "kind": str(self.plan.kind)}
+        document = canonical({**about, "at": self.label, **said})
+        self._database.run(statements.NEXT_EVENT)
+        values = {"plant": self.plan.plant, "at": self.label, "document": document}
+        self._database.run(statements.ADD_EVENT, values)
 
     def _checked(self, job: CellJob, end: EndedJob) -> Halt | None:
         """Halt the plan if an end breaks a rule, or pause it behind a ring."""
         accepted, until = accepted_in(self._database, self.plan.id)
         counts = self._database.rows(statements.COUNTS, {"plan": self.plan.id, "after": until})
         stage = stage_of(self.plan.sizes, job.ring)
-        of_ring = {JobState(state): int(n) for ring, state, n, _, _ in counts if ring == job.ring}
+        of_ring = {JobState(state): int(n) for ring, state, n, *_ in counts if ring == job.ring}
+        # Of a cause that is no cell's, no cell has refused anything.
+        caused = sum(int(n) for ring, *_, n in counts if ring == job.ring)
         answered = sum(n for state, n in of_ring.items() if state.answered)
         tally = RingTally(
             rings=self.plan.sizes,
             ring=job.ring,
             ended=sum(n for state, n in of_ring.items() if state.final),
             answered=answered,
-            refused=of_ring.get(JobState.REFUSED, 0),
-            stage_ended=sum(int(n) for ring, _, _, n, _ in counts if ring in stage),
+            refused=of_ring.get(JobState.REFUSED, 0) - caused,
+            stage_ended=sum(int(n) for ring, _, _, n, *_ in counts if ring in stage),
             expected_refusals=0.0 if self.plan.kind.reads else self.plan.expected_refusals,
         )
         where = {"plan": self.plan.id, "after": until, "first": stage[0], "last": stage[-1]}
@@ -174,7 +271,7 @@ class PlanCourse:
             and tally.ended == self.plan.sizes[job.ring]
             and job.ring + 1 < len(self.plan.rings)
         ):
-            known = sum(int(n) for ring, _, _, _, n in counts if ring == job.ring)
+            known = sum(int(n) for ring, _, _, _, n, _ in counts if ring == job.ring)
             well = answered == tally.ended and (known == answered or self.plan.kind.reads)
             if not (self.plan.auto and well):
                 finding = HaltFinding(HaltRule.PAUSE, {"ring": job.ring + 1, "cells": tally.ended})
@@ -224,7 +321,38 @@ class PlanCourse:
             "by_whom": storable(by),
         }
         self._database.run(statements.ADD_HALT, values)
-        return self.standing()[-1]
+        halt = self.standing()[-1]
+        said = {"halt": halt.number, "rule": str(halt.rule), "cell": cell or None}
+        self._tell("halt", **said, by=halt.by or None, numbers=dict(halt.numbers))
+        return halt
+
+    def lift(self, last: Halt, by: str, reason: str, accepted: tuple[str, int]) -> None:
+        """Lift the halts up to one, and deliver again what they ended.
+
+        Args:
+            last: The last one.
+            by: Who lifts them.
+            reason: Why.
+            accepted: What is accepted by that, as :meth:`accepted_by` says.
+        """
+        shifts, until = accepted
+        who = {"by_whom": storable(by), "reason": storable(reason)}
+        values = {"plan": self.plan.id, "at": self.label, **who, "accepted": shifts}
+        self._database.run(statements.LIFT_HALTS, {**values, "until": until, "last": last.number})
+        self._database.run(statements.DELIVER_AGAIN, {"plan": self.plan.id})
+        self._tell("resumed", halt=last.number, by=storable(by), reason=storable(reason))
+
+    def cancel(self, by: str) -> int:
+        """Cancel the plan and its waiting jobs; return how many they were.
+
+        Args:
+            by: Who cancels it.
+        """
+        values = {"plan": self.plan.id, "at": self.label}
+        self._database.run(statements.CANCEL_PLAN, values)
+        count = self._database.run(statements.CANCEL_JOBS, values)
+        self._tell("cancelled", by=storable(by), jobs=count)
+        return count
 
     def halt_of(self, by: str, reason: str) -> Halt:
         """Halt the plan in a person's name, once; return that halt.
@@ -274,6 +402,57 @@ class PlanCourse:
         """Return the number of the last end of a job."""
         ((last,),) = self._database.rows(statements.LAST_SEQUENCE, {"plan": self.plan.id})
         return int(last)
+
+
+def progress_in(database: DatabaseConnection, plan: str, now: datetime) -> PlanProgress:
+    """Return how a plan stands.
+
+    Args:
+        database: The connection, within a transaction.
+        plan: Id of the plan.
+        now: The time, with its zone.
+
+    Raises:
+        PlanError: There is none of that id.
+    """
+    found, cancelled_at, bound_to = plan_in(database, plan)
+    jobs = tuple(map(read_job, database.rows(statements.JOBS, {"plan": plan})))
+    halts = tuple(map(read_halt, database.rows(statements.HALTS, {"plan": plan})))
+    at_work = database.rows(statements.ALL_AT_WORK, {"plant": found.plant})
+    busy = frozenset(cell for cell, order in at_work if order != found.order(cell))
+    homes = homes_of_plan(database, found, bound_to)
+    facts = PlanCourse(database, found, now).facts(busy, cells_away(found, homes, now))
+    return PlanProgress(found, jobs, halts, facts, cancelled_at, bound_to, homes)
+
+
+def added_plan(
+    database: DatabaseConnection, plan: Plan, now: datetime, *, starts: bool = True
+) -> bool:
+    """Keep a plan and the jobs of its cells; return whether it was not there before.
+
+    Args:
+        database: The connection, within the transaction.
+        plan: The plan.
+        now: The time.
+        starts: Whether it starts with that, and need not be resumed first.
+    """
+    document = canonical(plan.document())
+    said = {"plan": plan.id, "plant": plan.plant, "at": plan.made_at, "document": document}
+    if not database.run(statements.ADD_PLAN, said):
+        return False
+    database.run(statements.ADD_PLANT, {"plant": plan.plant, "at": label_of(now)})
+    cells = [{"plant": plan.plant, "cell": cell} for cell in plan.cells]
+    database.run_many(statements.ADD_CELL, cells)
+    places = ((ring, cell) for ring, cells in enumerate(plan.rings) for cell in cells)
+    rows = [
+        {"plan": plan.id, "cell": cell, "ring": ring, "place": place}
+        for place, (ring, cell) in enumerate(places)
+    ]
+    database.run_many(statements.ADD_JOB, rows)
+    if not starts:
+        pause = HaltFinding(HaltRule.PAUSE, {"ring": 0, "cells": 0})
+        PlanCourse(database, plan, now).add_halt(pause)
+    return True
 
 
 def state_after(kind: PlanKind, treatment: Treatment, attempt: int) -> JobState:

@@ -72,6 +72,11 @@ class FleetDatabase:
         """Whether it may hold anything: files are looked for, servers are not."""
         return self._place.path is None or self._place.path.exists()
 
+    @property
+    def shared(self) -> bool:
+        """Whether several computers may use it: a server, no file."""
+        return self._place.path is None
+
     def close(self) -> None:
         """Close the connection; the next use makes a new one."""
         with self._lock:
@@ -112,12 +117,12 @@ class FleetDatabase:
 
     def _connected(self) -> DatabaseConnection:
         if self._connection is None:
-            backend = backend_of(self._place, read_only=False)
+            backend = backend_of(self._place, read_only=False, prompt=True)
             self._failures = (*_OF_FILES, *backend.failures)
             connection = backend.connect()
             try:
                 enter_schema(connection)
-                bring_up_to_date(connection, self.name)
+                bring_up_to_date(connection, self.name, self._failures)
             except BaseException:
                 connection.close()
                 raise

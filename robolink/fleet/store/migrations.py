@@ -6,10 +6,11 @@ A migration that was once released never changes; what comes later is a migratio
 from collections.abc import Callable
 from typing import Final
 
-from robolink.fleet.errors import PlantError
+from robolink.fleet.errors import PlantError, PlantVersionError
 from robolink.fleet.store import statements
 from robolink.journal.store.connection import DatabaseConnection
-from robolink.messages import tr
+from robolink.journal.store.failures import cause_of
+from robolink.messages import listed, tr
 
 SCHEMA: Final = "fleet"
 """Schema of the tables in PostgreSQL, beside those of others in the same database."""
@@ -54,11 +55,68 @@ _FIRST_TABLES: Final = """
 
 
 def _first_tables(connection: DatabaseConnection) -> None:
-    for statement in _FIRST_TABLES.split(";"):
+    _run(connection, _FIRST_TABLES)
+
+
+def _run(connection: DatabaseConnection, statements: str) -> None:
+    for statement in statements.split(";"):
         connection.run(statement.strip())
 
 
-MIGRATIONS: tuple[Callable[[DatabaseConnection], None], ...] = (_first_tables,)
+_LINE_JOBS: Final = """
+    CREATE TABLE IF NOT EXISTS line_jobs (
+        order_id TEXT NOT NULL, line TEXT NOT NULL, plan TEXT NOT NULL, cell TEXT NOT NULL,
+        posted_at TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (order_id, line)
+    )
+"""
+
+
+def _line_jobs(connection: DatabaseConnection) -> None:
+    connection.run(_LINE_JOBS.strip())
+
+
+_WHAT_A_PLANT_SEES: Final = """
+    ALTER TABLE outcomes ADD COLUMN proof INTEGER NOT NULL DEFAULT 0;
+    CREATE TABLE IF NOT EXISTS cell_states (
+        plant TEXT NOT NULL, cell TEXT NOT NULL, noted_at TEXT NOT NULL, document TEXT NOT NULL,
+        PRIMARY KEY (plant, cell)
+    );
+    CREATE TABLE IF NOT EXISTS events (
+        number INTEGER NOT NULL, plant TEXT NOT NULL, at TEXT NOT NULL, document TEXT NOT NULL,
+        PRIMARY KEY (number)
+    );
+    CREATE TABLE IF NOT EXISTS last_event (number INTEGER NOT NULL);
+    CREATE TABLE IF NOT EXISTS positions (
+        name TEXT NOT NULL, chain TEXT NOT NULL, number INTEGER NOT NULL, PRIMARY KEY (name)
+    );
+    INSERT INTO last_event (number) VALUES (0)
+"""
+
+
+def _what_a_plant_sees(connection: DatabaseConnection) -> None:
+    _run(connection, _WHAT_A_PLANT_SEES)
+
+
+_HOMES: Final = """
+    ALTER TABLE plans ADD COLUMN home TEXT NOT NULL DEFAULT '';
+    CREATE TABLE homes (
+        plant TEXT NOT NULL, home TEXT NOT NULL, name TEXT NOT NULL, heard_at TEXT NOT NULL,
+        agent TEXT NOT NULL, PRIMARY KEY (plant, home)
+    )
+"""
+"""Of a plan: the computer that carries it out, where its cells name no home and one has begun."""
+
+
+def _homes(connection: DatabaseConnection) -> None:
+    _run(connection, _HOMES)
+
+
+MIGRATIONS: tuple[Callable[[DatabaseConnection], None], ...] = (
+    _first_tables,
+    _what_a_plant_sees,
+    _homes,
+    _line_jobs,
+)
 
 
 def enter_schema(connection: DatabaseConnection) -> None:
@@ -76,24 +134,69 @@ def enter_schema(connection: DatabaseConnection) -> None:
     connection.commit()
 
 
-def bring_up_to_date(connection: DatabaseConnection, name: str) -> None:
+def bring_up_to_date(
+    connection: DatabaseConnection, name: str, failures: tuple[type[Exception], ...]
+) -> None:
     """Make or change the tables until they are those of now.
 
+    Args:
+        connection: The connection.
+        name: The database, as a person is told.
+        failures: What the database raises.
+
     Raises:
-        PlantError: A newer robolink made them, or the file is another database.
+        PlantVersionError: A newer robolink made them, or an older one, and this user may not
+            change them.
+        PlantError: The file is another database.
     """
     found = _version(connection, name)
     connection.roll_back()
     if found < len(MIGRATIONS):
-        connection.run(connection.begin_migrating)
-        # Another process may have been faster while this one waited for the lock.
-        found = _version(connection, name)
-        for step in MIGRATIONS[found:]:
-            step(connection)
-        connection.run(statements.SET_VERSION, {"own": max(found, len(MIGRATIONS))})
-        connection.commit()
+        try:
+            found = _migrate(connection, name)
+        except failures as error:
+            if not found:
+                raise
+            raise PlantVersionError(
+                listed(
+                    tr(
+                        "The plant's database {name} is older than this robolink, and could not be "
+                        "brought up to date:",
+                        name=name,
+                    ),
+                    [cause_of(error)],
+                ),
+                remedy=tr(
+                    "Nothing was begun. Let the owner of its tables run: robolink fleet status"
+                ),
+            ) from error
+    require_version(found, name)
+
+
+def _migrate(connection: DatabaseConnection, name: str) -> int:
+    connection.run(connection.begin_migrating)
+    # Another process may have been faster while this one waited for the lock.
+    found = _version(connection, name)
+    for step in MIGRATIONS[found:]:
+        step(connection)
+    found = max(found, len(MIGRATIONS))
+    connection.run(statements.SET_VERSION, {"own": found})
+    connection.commit()
+    return found
+
+
+def require_version(found: int, name: str) -> None:
+    """Refuse tables that a newer robolink made, or changed meanwhile.
+
+    Args:
+        found: Their version.
+        name: The database, as a person is told.
+
+    Raises:
+        PlantVersionError: They are newer.
+    """
     if found > len(MIGRATIONS):
-        raise PlantError(
+        raise PlantVersionError(
             tr("The plant's database {name} is newer than this robolink.", name=name),
             remedy=tr("Nothing was written. Install the newer robolink."),
         )

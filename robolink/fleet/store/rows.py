@@ -4,9 +4,10 @@ import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from robolink.fleet.corrections import TipCorrection
+from robolink.fleet.errors import PlanError
 from robolink.fleet.halts import Accepted, HaltRule, Key
 from robolink.fleet.outcome_codes import Treatment
 from robolink.fleet.plans import Plan
@@ -15,6 +16,7 @@ from robolink.fleet.states import JobState
 from robolink.fleet.store import statements
 from robolink.journal.store.chain import storable
 from robolink.journal.store.connection import DatabaseConnection
+from robolink.messages import known_names, tr
 
 
 def label_of(now: datetime) -> str:
@@ -26,6 +28,42 @@ def label_of(now: datetime) -> str:
 def read_plan(document: str) -> Plan:
     """Return a plan from its document."""
     return Plan.from_document(json.loads(document))
+
+
+class StoredPlan(NamedTuple):
+    """A plan as it is stored.
+
+    Attributes:
+        plan: The plan.
+        cancelled_at: When it was cancelled; empty where it was not.
+        bound_to: The computer that carries it out, where its cells name no home and one has begun.
+    """
+
+    plan: Plan
+    cancelled_at: str
+    bound_to: str
+
+
+def plan_in(database: DatabaseConnection, plan: str) -> StoredPlan:
+    """Return a plan by its id.
+
+    Raises:
+        PlanError: There is none of that id, or it was changed.
+    """
+    rows = database.rows(statements.PLAN, {"plan": plan})
+    if not rows:
+        raise unknown_plan(database, plan)
+    document, cancelled_at, bound_to = rows[0]
+    return StoredPlan(read_plan(document), cancelled_at, bound_to)
+
+
+def unknown_plan(database: DatabaseConnection, plan: str) -> PlanError:
+    """Return the error of an id that no plan has."""
+    ids = [read_plan(document).id for document, _ in database.rows(statements.PLANS)]
+    return PlanError(
+        tr("There is no plan {plan}.", plan=plan),
+        remedy=known_names(ids, plan) if ids else tr("Make a plan first."),
+    )
 
 
 def read_job(row: Sequence[Any]) -> CellJob:

@@ -21,27 +21,45 @@ FREE_CELL: Final = (
     "UPDATE cells SET at_work = '' WHERE plant = :plant AND cell = :cell AND at_work = :order_id"
 )
 
+# ---- Homes
+
+HEAR_HOME: Final = (
+    "INSERT INTO homes (plant, home, name, heard_at, agent) "
+    "VALUES (:plant, :home, :name, :at, :agent) ON CONFLICT (plant, home) "
+    "DO UPDATE SET name = :name, heard_at = :at, agent = :agent"
+)
+HOMES: Final = "SELECT plant, name, heard_at, agent FROM homes ORDER BY plant, home"
+HOMES_OF: Final = "SELECT plant, name, heard_at, agent FROM homes WHERE plant = :plant"
+
 # ---- Plans
 
 ADD_PLAN: Final = (
     "INSERT INTO plans (plan, plant, made_at, document, cancelled_at) "
     f"VALUES (:plan, :plant, :at, :document, '') {_UNLESS_THERE}"
 )
-PLAN: Final = "SELECT document, cancelled_at FROM plans WHERE plan = :plan"
+PLAN: Final = "SELECT document, cancelled_at, home FROM plans WHERE plan = :plan"
 PLANS: Final = "SELECT document, cancelled_at FROM plans ORDER BY made_at DESC, plan"
+RECENT_PLANS: Final = (
+    "SELECT document, cancelled_at FROM plans WHERE plant = :plant AND (made_at >= :since OR plan "
+    "IN (SELECT plan FROM plans WHERE plant = :plant ORDER BY made_at DESC, plan LIMIT :most) OR "
+    "EXISTS (SELECT 1 FROM outcomes WHERE outcomes.plan = plans.plan AND state IN "
+    "('waiting', 'running'))) ORDER BY made_at DESC, plan"
+)
 NEWEST_PLANS: Final = f"{PLANS} LIMIT :most"
 OPEN_PLANS: Final = (
-    "SELECT plan FROM plans WHERE plant = :plant AND EXISTS (SELECT 1 FROM outcomes "
-    "WHERE outcomes.plan = plans.plan AND state IN ('waiting', 'running')) ORDER BY made_at, plan"
+    "SELECT plan FROM plans WHERE :plant IN ('', plant) AND EXISTS (SELECT 1 FROM outcomes "
+    "WHERE outcomes.plan = plans.plan AND :cell IN ('', cell) "
+    "AND state IN ('waiting', 'running')) ORDER BY made_at, plan"
 )
-LOCK_PLAN: Final = "SELECT cancelled_at FROM plans WHERE plan = :plan"
+LOCK_PLAN: Final = "SELECT cancelled_at, home FROM plans WHERE plan = :plan"
+BIND_PLAN: Final = "UPDATE plans SET home = :home WHERE plan = :plan AND home = ''"
 CANCEL_PLAN: Final = "UPDATE plans SET cancelled_at = :at WHERE plan = :plan"
 
 # ---- Jobs and their outcomes
 
 JOB_COLUMNS: Final = (
     *("plan", "cell", "ring", "state", "attempt", "begun_at", "ended_at", "code"),
-    *("error", "reason", "what", "change", "treatment", "sequence"),
+    *("error", "reason", "what", "change", "treatment", "sequence", "proof"),
 )
 _JOBS: Final = f"SELECT {', '.join(JOB_COLUMNS)} FROM outcomes WHERE plan = :plan"
 ADD_JOB: Final = (
@@ -62,9 +80,18 @@ END_JOB: Final = (
     "reason = :reason, what = :what, change = :change, treatment = :treatment, judged = :judged, "
     "corrections = :corrections, sequence = :sequence WHERE plan = :plan AND cell = :cell"
 )
+UNPROVED: Final = (
+    "SELECT outcomes.plan, cell FROM outcomes JOIN plans ON plans.plan = outcomes.plan "
+    "WHERE plans.plant = :plant AND state = 'unproved' ORDER BY plans.made_at, outcomes.place"
+)
+PROVE_JOB: Final = (
+    "UPDATE outcomes SET state = 'kept', proof = :proof "
+    "WHERE plan = :plan AND cell = :cell AND state = 'unproved'"
+)
 DELIVER_AGAIN: Final = (
     "UPDATE outcomes SET state = 'waiting', treatment = '', sequence = 0 "
-    "WHERE plan = :plan AND (state = 'unsettled' OR (state = 'waiting' AND error = 'BusyError'))"
+    "WHERE plan = :plan AND (state = 'unsettled' OR (state = 'refused' AND treatment = 'halt') "
+    "OR (state = 'waiting' AND error = 'BusyError'))"
 )
 CANCEL_JOBS: Final = (
     "UPDATE outcomes SET state = 'cancelled', ended_at = :at "
@@ -72,7 +99,8 @@ CANCEL_JOBS: Final = (
 )
 COUNTS: Final = (
     "SELECT ring, state, count(*), sum(CASE WHEN sequence > :after THEN 1 ELSE 0 END), "
-    "sum(judged) FROM outcomes WHERE plan = :plan GROUP BY ring, state"
+    "sum(judged), sum(CASE WHEN treatment = 'halt' THEN 1 ELSE 0 END) "
+    "FROM outcomes WHERE plan = :plan GROUP BY ring, state"
 )
 STATES: Final = "SELECT state, count(*) FROM outcomes WHERE plan = :plan GROUP BY state"
 RUNNING: Final = "SELECT count(*) FROM outcomes WHERE plan = :plan AND state = 'running'"
@@ -128,4 +156,63 @@ ADD_PERMIT: Final = (
 REVOKE_PERMIT: Final = (
     "UPDATE permits SET revoked_by = :by_whom, revoked_at = :at "
     "WHERE number = :number AND revoked_at = ''"
+)
+
+# ---- Jobs of line computers
+
+LINE_JOB_COLUMNS: Final = ("line", "order_id", "plan", "cell", "posted_at", "body")
+_LINE_JOBS: Final = (
+    f"SELECT {', '.join(LINE_JOB_COLUMNS)} FROM line_jobs WHERE order_id = :order_id"
+)
+ADD_LINE_JOB: Final = (
+    "INSERT INTO line_jobs (line, order_id, plan, cell, posted_at, body) "
+    f"VALUES (:line, :order_id, :plan, :cell, :at, :body) {_UNLESS_THERE}"
+)
+OPEN_LINE_JOBS: Final = (
+    "SELECT count(*) FROM line_jobs WHERE line = :line AND EXISTS (SELECT 1 FROM outcomes WHERE "
+    "outcomes.plan = line_jobs.plan AND state IN ('waiting', 'running'))"
+)
+LINE_JOB: Final = f"{_LINE_JOBS} AND line = :line"
+LINE_JOBS: Final = f"{_LINE_JOBS} ORDER BY posted_at, line"
+
+# ---- What a plant sees
+
+CELL_STATES: Final = (
+    "SELECT cell, noted_at, document FROM cell_states WHERE plant = :plant ORDER BY cell"
+)
+UNNOTED_CELLS: Final = (
+    "SELECT cell FROM cells WHERE plant = :plant AND NOT EXISTS (SELECT 1 FROM cell_states "
+    "WHERE cell_states.plant = cells.plant AND cell_states.cell = cells.cell) ORDER BY cell"
+)
+CELL_STATE: Final = (
+    "SELECT noted_at, document FROM cell_states WHERE plant = :plant AND cell = :cell"
+)
+NOTE_CELL: Final = (
+    "INSERT INTO cell_states (plant, cell, noted_at, document) "
+    "VALUES (:plant, :cell, :at, :document) ON CONFLICT (plant, cell) DO UPDATE "
+    "SET noted_at = excluded.noted_at, document = excluded.document"
+)
+# The row of the last event is locked until the end of its transaction: so events become visible
+# in the order of their numbers, and who has read up to one has read all before it.
+NEXT_EVENT: Final = "UPDATE last_event SET number = number + 1"
+ADD_EVENT: Final = (
+    "INSERT INTO events (number, plant, at, document) "
+    "VALUES ((SELECT number FROM last_event), :plant, :at, :document)"
+)
+EVENTS: Final = (
+    "SELECT number, document FROM events WHERE plant = :plant AND number > :after "
+    "ORDER BY number LIMIT :most"
+)
+LAST_EVENT: Final = "SELECT number FROM last_event"
+POSITION: Final = "SELECT chain, number FROM positions WHERE name = :name"
+SET_POSITION: Final = (
+    "INSERT INTO positions (name, chain, number) VALUES (:name, :chain, :number) "
+    "ON CONFLICT (name) DO UPDATE SET chain = excluded.chain, number = excluded.number"
+)
+# Copies at the plant: PostgreSQL alone takes them (robolink/journal/_plant.py).
+TAKES_COPIES: Final = "SELECT to_regclass('fleet.cell_heads')"
+BEHIND: Final = (
+    "SELECT coalesce(sum(greatest(positions.number - coalesce(cell_heads.number, 0), 0)), 0) "
+    "FROM positions LEFT JOIN cell_heads ON cell_heads.chain = positions.chain "
+    "WHERE positions.name LIKE :journals"
 )

@@ -8,9 +8,8 @@ each other's outcomes: a rule is checked in the transaction of the outcome that 
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
+from typing import Self
 
-from robolink.fleet.errors import PlanError
-from robolink.fleet.halts import HaltFinding, HaltRule
 from robolink.fleet.outcome_codes import Treatment, treatment_of
 from robolink.fleet.plans import Plan
 from robolink.fleet.progress import (
@@ -19,24 +18,30 @@ from robolink.fleet.progress import (
     Permit,
     PlanOverview,
     PlanProgress,
+    PlantHome,
     RecordedOutcome,
     Turn,
 )
 from robolink.fleet.states import JobState, WaitReason
 from robolink.fleet.store import statements
-from robolink.fleet.store.course import PlanCourse, state_after
+from robolink.fleet.store.course import PlanCourse, added_plan, progress_in, state_after
 from robolink.fleet.store.database import FleetDatabase
+from robolink.fleet.store.homes import (
+    hear_home,
+    homes_in,
+    require_one_computer,
+)
+from robolink.fleet.store.migrations import require_version
+from robolink.fleet.store.permits import add_permit, revoke_permit
 from robolink.fleet.store.rows import (
     label_of,
-    permit_values,
-    read_halt,
-    read_job,
+    plan_in,
     read_permit,
     read_plan,
+    unknown_plan,
 )
-from robolink.journal.store.chain import canonical, storable
+from robolink.journal import this_computer
 from robolink.journal.store.connection import DatabaseConnection
-from robolink.messages import known_names, tr
 from robolink.timing import wall_time
 
 
@@ -49,6 +54,10 @@ class FleetStore:
     Args:
         location: Path of a file, or URL of a PostgreSQL database.
         clock: Returns the time, with its zone: it decides windows, permits and labels.
+        home: Name of the computer whose cells jobs are begun for; of this one unless given.
+
+    Attributes:
+        home: The same.
 
     Raises:
         PlantError: The location is none.
@@ -65,7 +74,14 @@ class FleetStore:
         (<JobState.KEPT: 'kept'>, False)
     """
 
-    def __init__(self, location: str, *, clock: Callable[[], datetime] = wall_time) -> None:
+    def __init__(
+        self,
+        location: str,
+        *,
+        clock: Callable[[], datetime] = wall_time,
+        home: str | None = None,
+    ) -> None:
+        self.home = this_computer() if home is None else home
         self._database = FleetDatabase(location)
         self._clock = clock
         self._plans: dict[str, Plan] = {}
@@ -80,7 +96,7 @@ class FleetStore:
         """Whether it may hold anything: files are looked for, servers are not."""
         return self._database.made
 
-    def __enter__(self) -> "FleetStore":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -100,29 +116,13 @@ class FleetStore:
             starts: Whether it starts with that, and need not be resumed first.
 
         Raises:
+            PlanError: Its cells have several homes, and the database is a file.
             PlantError: The database cannot be used; nothing was kept.
         """
-        now = label_of(self._clock())
-        document = canonical(plan.document())
-        places = ((ring, cell) for ring, cells in enumerate(plan.rings) for cell in cells)
-        rows = [
-            {"plan": plan.id, "cell": cell, "ring": ring, "place": place}
-            for place, (ring, cell) in enumerate(places)
-        ]
+        if not self._database.shared:
+            require_one_computer(plan, self.home, self.name)
         with self._database.transaction() as database:
-            added = database.run(
-                statements.ADD_PLAN,
-                {"plan": plan.id, "plant": plan.plant, "at": plan.made_at, "document": document},
-            )
-            if added:
-                database.run(statements.ADD_PLANT, {"plant": plan.plant, "at": now})
-                cells = [{"plant": plan.plant, "cell": cell} for cell in plan.cells]
-                database.run_many(statements.ADD_CELL, cells)
-                database.run_many(statements.ADD_JOB, rows)
-                if not starts:
-                    numbers = {"ring": 0, "cells": 0, "moves": plan.kind.moves}
-                    pause = HaltFinding(HaltRule.PAUSE, numbers)
-                    self._course(database, plan.id).add_halt(pause)
+            added_plan(database, plan, self._clock(), starts=starts)
 
     def plan(self, plan: str) -> Plan:
         """Return a plan.
@@ -132,7 +132,7 @@ class FleetStore:
             PlantError: The database cannot be used.
         """
         with self._database.transaction() as database:
-            return self._plan(database, plan)[0]
+            return plan_in(database, plan).plan
 
     def plans(self) -> tuple[Plan, ...]:
         """Return all plans, newest first.
@@ -142,17 +142,20 @@ class FleetStore:
             PlantError: The database cannot be used.
         """
         with self._database.transaction() as database:
-            rows = database.rows(statements.PLANS)
-        return tuple(read_plan(document) for document, _ in rows)
+            return tuple(read_plan(said) for said, _ in database.rows(statements.PLANS))
 
-    def open_plans(self, plant: str) -> tuple[str, ...]:
-        """Return the ids of the plans of a plant of which a job has not ended, oldest first.
+    def open_plans(self, plant: str = "", cell: str = "") -> tuple[str, ...]:
+        """Return the ids of the plans of which a job has not ended, oldest first.
+
+        Args:
+            plant: Only those of this plant.
+            cell: Only those of which the job of this cell has not ended.
 
         Raises:
             PlantError: The database cannot be used.
         """
         with self._database.transaction() as database:
-            rows = database.rows(statements.OPEN_PLANS, {"plant": plant})
+            rows = database.rows(statements.OPEN_PLANS, {"plant": plant, "cell": cell})
         return tuple(plan for (plan,) in rows)
 
     def overviews(self, most: int = 20) -> tuple[PlanOverview, ...]:
@@ -183,15 +186,30 @@ class FleetStore:
             PlantError: The database cannot be used.
         """
         with self._database.transaction() as database:
-            found, cancelled_at = self._plan(database, plan)
-            rows = database.rows(statements.JOBS, {"plan": plan})
-            halts = database.rows(statements.HALTS, {"plan": plan})
-            at_work = database.rows(statements.ALL_AT_WORK, {"plant": found.plant})
-            busy = frozenset(cell for cell, order in at_work if order != found.order(cell))
-            facts = PlanCourse(database, found, self._clock()).facts(busy)
-        return PlanProgress(
-            found, tuple(map(read_job, rows)), tuple(map(read_halt, halts)), facts, cancelled_at
-        )
+            return progress_in(database, plan, self._clock())
+
+    # ---- Homes
+
+    def hear_home(self, plant: str) -> None:
+        """Note that the agent of this computer lives; others show since when it does not.
+
+        Raises:
+            PlantVersionError: Another version of robolink has changed the tables meanwhile.
+            PlantError: The database cannot be used.
+        """
+        with self._database.transaction() as database:
+            ((version,),) = database.rows(statements.VERSION)
+            require_version(int(version), self.name)
+            hear_home(database, plant, self.home, label_of(self._clock()))
+
+    def homes(self) -> tuple[PlantHome, ...]:
+        """Return the computers whose agents were ever heard.
+
+        Raises:
+            PlantError: The database cannot be used.
+        """
+        with self._database.transaction() as database:
+            return homes_in(database)
 
     # ---- Jobs
 
@@ -210,7 +228,8 @@ class FleetStore:
 
         A job that was begun and has not ended is handed out again, as the same attempt: its order
         is carried out once, however often it is delivered. What it has not done yet it does only
-        if :attr:`Turn.may_write` says so. One that has ended is not begun again.
+        if :attr:`Turn.may_write` says so. One that has ended is not begun again. On another
+        computer than the home of the cell none is begun, and none handed out.
 
         Raises:
             PlanError: There is no such plan, or it has no such cell.
@@ -218,19 +237,25 @@ class FleetStore:
         """
         with self._database.transaction() as database:
             course = self._course(database, plan)
+            where = {"plant": course.plan.plant, "cell": cell}
+            # The cell before the events, to which miss() adds, as the end of a job takes them.
+            at_work = database.rows(statements.AT_WORK + database.row_lock, where)
             course.miss()
             job = course.job(cell)
+            elsewhere = not course.is_at_home(cell, self.home)
+            if elsewhere and not job.state.final:
+                return Turn(job, WaitReason.HOME)
             if job.state is not JobState.WAITING:
                 return Turn(job, may_write=course.facts(frozenset()).may_write)
-            where = {"plant": course.plan.plant, "cell": cell}
-            (order,) = database.rows(statements.AT_WORK + database.row_lock, where)[0]
+            ((order,),) = at_work
             busy = frozenset([cell] if order not in ("", course.plan.order(cell)) else [])
             why = course.facts(busy).why(job)
             if why is not WaitReason.TURN:
                 return Turn(job, why)
             database.run(statements.SET_AT_WORK, {**where, "order_id": course.plan.order(cell)})
-            begun = {"plan": plan, "cell": cell, "at": course.label}
-            database.run(statements.BEGIN_JOB, begun)
+            if self._database.shared:
+                course.bind(self.home)
+            database.run(statements.BEGIN_JOB, {"plan": plan, "cell": cell, "at": course.label})
             return Turn(course.job(cell))
 
     def record_outcome(
@@ -266,15 +291,7 @@ class FleetStore:
         with self._database.transaction() as database:
             course = self._course(database, plan)
             job = course.job(cell)
-            if attempt < 1 or attempt > job.attempt:
-                raise PlanError(
-                    tr(
-                        "Attempt {attempt} of {order} was never begun.",
-                        attempt=attempt,
-                        order=job.order,
-                    ),
-                    remedy=tr("Begin a job before it is carried out."),
-                )
+            course.require_begun(job, attempt)
             worse = treatment is Treatment.UNSETTLED and job.state is not JobState.UNSETTLED
             open_now = job.state is JobState.RUNNING and attempt == job.attempt
             if not (open_now or worse):
@@ -284,7 +301,14 @@ class FleetStore:
 
     # ---- Halts
 
-    def halt(self, plan: str, by: str, reason: str = "") -> Halt:
+    def halt(
+        self,
+        plan: str,
+        by: str,
+        reason: str = "",
+        *,
+        confirm: Callable[[], None] = lambda: None,
+    ) -> Halt:
         """Halt a plan: nothing of it begins until it is resumed; what runs comes to its end.
 
         A plan that this person has halted already stays so, by the same halt.
@@ -293,6 +317,7 @@ class FleetStore:
             plan: Its id.
             by: Who halts it.
             reason: Why.
+            confirm: Called as the last thing before it is kept: what it raises, undoes all.
 
         Example:
             >>> from robolink.fleet import FleetStore, JobOutcome, plan_of
@@ -311,10 +336,18 @@ class FleetStore:
             PlantError: The database cannot be used; the plan was not halted.
         """
         with self._database.transaction() as database:
-            return self._course(database, plan).halt_of(by, reason)
+            halt = self._course(database, plan).halt_of(by, reason)
+            confirm()
+            return halt
 
     def resume(
-        self, plan: str, by: str, reason: str, *, seen: Halt | None = None
+        self,
+        plan: str,
+        by: str,
+        reason: str,
+        *,
+        seen: Halt | None = None,
+        confirm: Callable[[], None] = lambda: None,
     ) -> tuple[Halt, ...]:
         """Let a halted plan, or the next ring after a pause, go on.
 
@@ -329,6 +362,7 @@ class FleetStore:
             reason: Why that is right.
             seen: The last halt that the person saw; a later one stands. All are lifted unless
                 given.
+            confirm: Called as the last thing before it is kept: what it raises, undoes all.
 
         Returns:
             The halts that were lifted.
@@ -351,20 +385,10 @@ class FleetStore:
         with self._database.transaction() as database:
             course = self._course(database, plan)
             standing = course.to_lift(seen)
-            accepted, until = course.accepted_by(standing)
-            values = {
-                "plan": plan,
-                "at": course.label,
-                "by_whom": storable(by),
-                "reason": storable(reason),
-                "accepted": accepted,
-                "until": until,
-                "last": standing[-1].number,
-            }
-            database.run(statements.LIFT_HALTS, values)
-            database.run(statements.DELIVER_AGAIN, {"plan": plan})
+            course.lift(standing[-1], by, reason, course.accepted_by(standing))
+            confirm()
             return tuple(
-                replace(halt, lifted_at=str(values["at"]), lifted_by=by, reason=reason)
+                replace(halt, lifted_at=course.label, lifted_by=by, reason=reason)
                 for halt in standing
             )
 
@@ -396,9 +420,7 @@ class FleetStore:
         with self._database.transaction() as database:
             course = self._course(database, plan)
             course.halt_of(by, reason)
-            values = {"plan": plan, "at": course.label}
-            database.run(statements.CANCEL_PLAN, values)
-            return database.run(statements.CANCEL_JOBS, values)
+            return course.cancel(by)
 
     # ---- Permits
 
@@ -411,12 +433,7 @@ class FleetStore:
             PlantError: The database cannot be used; it was not given.
         """
         with self._database.transaction() as database:
-            self._require_known(database, permit)
-            values = permit_values(permit, label_of(self._clock()))
-            while True:  # another may take the number meanwhile
-                ((number,),) = database.rows(statements.NEXT_PERMIT)
-                if database.run(statements.ADD_PERMIT, {"number": number, **values}):
-                    return read_permit(database.rows(statements.PERMIT, {"number": number})[0])
+            return add_permit(database, permit, label_of(self._clock()))
 
     def revoke_permit(self, number: int, by: str) -> Permit:
         """Revoke a permit: no job begins by it any more. One that is revoked already stays so.
@@ -426,14 +443,7 @@ class FleetStore:
             PlantError: The database cannot be used; it holds still.
         """
         with self._database.transaction() as database:
-            values = {"number": number, "by_whom": storable(by), "at": label_of(self._clock())}
-            database.run(statements.REVOKE_PERMIT, values)
-            rows = database.rows(statements.PERMIT, {"number": number})
-        if not rows:
-            raise PlanError(
-                tr("There is no permit {number}.", number=number), remedy=tr("Nothing was changed.")
-            )
-        return read_permit(rows[0])
+            return revoke_permit(database, number, by, label_of(self._clock()))
 
     def permit_for(self, plan: Plan) -> Permit | None:
         """Return the permit by which the jobs of a plan may begin now, the oldest of several.
@@ -457,44 +467,13 @@ class FleetStore:
 
     # ---- Inside a transaction
 
-    def _plan(self, database: DatabaseConnection, plan: str) -> tuple[Plan, str]:
-        rows = database.rows(statements.PLAN, {"plan": plan})
-        if not rows:
-            raise self._unknown(database, plan)
-        document, cancelled_at = rows[0]
-        return read_plan(document), cancelled_at
-
     def _course(self, database: DatabaseConnection, plan: str) -> PlanCourse:
         """Take the lock of a plan."""
         rows = database.rows(statements.LOCK_PLAN + database.row_lock, {"plan": plan})
         if not rows:
-            raise self._unknown(database, plan)
-        ((cancelled_at,),) = rows
+            raise unknown_plan(database, plan)
+        ((cancelled_at, bound_to),) = rows
         if plan not in self._plans:  # frozen, and 40 kB for 2,000 cells
-            self._plans[plan] = self._plan(database, plan)[0]
-        return PlanCourse(database, self._plans[plan], self._clock(), bool(cancelled_at))
-
-    def _unknown(self, database: DatabaseConnection, plan: str) -> PlanError:
-        ids = [read_plan(document).id for document, _ in database.rows(statements.PLANS)]
-        return PlanError(
-            tr("There is no plan {plan}.", plan=plan),
-            remedy=known_names(ids, plan) if ids else tr("Make a plan first."),
-        )
-
-    def _require_known(self, database: DatabaseConnection, permit: Permit) -> None:
-        plants = [name for (name,) in database.rows(statements.PLANTS)]
-        if permit.plant not in plants:
-            raise PlanError(
-                tr("No plan of plant {plant} is known.", plant=permit.plant),
-                remedy=known_names(plants, permit.plant) if plants else tr("Make a plan first."),
-            )
-        if permit.plan and self._plan(database, permit.plan)[0].plant != permit.plant:
-            raise PlanError(
-                tr("Plan {plan} is not of plant {plant}.", plan=permit.plan, plant=permit.plant),
-                remedy=tr("Name the plant of the plan."),
-            )
-        if permit.until_at <= permit.from_at:
-            raise PlanError(
-                tr("The permit would end before it begins."),
-                remedy=tr("Give a later end."),
-            )
+            self._plans[plan] = plan_in(database, plan).plan
+        now = self._clock()
+        return PlanCourse(database, self._plans[plan], now, bool(cancelled_at), bound_to)

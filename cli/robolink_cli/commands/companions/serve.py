@@ -134,6 +134,8 @@ def _serve_programs(
     from robolink.serving import CallbackConversation, CallbackServer
     from robolink_cli.commands.simulate.service import host_and_port
 
+    if context.cell is not None:
+        context.cell.home.require_here()  # before anybody can connect
     host, port = host_and_port(address, "--spel")
     journal, signature = open_journal(), signature_here(__version__)
     events = ServeEvents()

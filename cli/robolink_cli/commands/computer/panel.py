@@ -20,7 +20,7 @@ from robolink_cli.console.output import hand_over
 from robolink_cli.console.render import json_is_on, note, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.declaration import CliOption
-from robolink_cli.options.shared import json_option
+from robolink_cli.options.shared import LINE, json_option
 
 if TYPE_CHECKING:
     from robolink.config import Cell
@@ -37,6 +37,10 @@ _ACCESS: Final = "robolink_cli.commands.computer.panel_access"
 SUBCOMMANDS: Final = {
     "pin": (f"{_ACCESS}:pin", declared("Set the PIN of a person, or of this computer.")),
     "tablets": (f"{_ACCESS}:tablets", declared("List the paired tablets; forget one.")),
+    "token": (
+        "robolink_cli.commands.computer.panel_tokens:token",
+        declared("Tokens of line computers, which order jobs: give list revoke"),
+    ),
     "cert": (f"{_ACCESS}:cert", declared("Make a certificate, for tablets on the network.")),
 }
 """What else there is about the panel, as :class:`~robolink_cli.lazy_group.LazyGroup` takes it."""
@@ -69,6 +73,9 @@ def panel(
         click.Path(exists=True, dir_okay=False, path_type=Path),
         CliOption("--tls-key", metavar="FILE", help="Its key, as PEM."),
     ] = None,
+    plant: Annotated[
+        str, LINE, CliOption(metavar="NAME", help="The plant whose plans people begin here.")
+    ] = "plant",
     demo: Annotated[
         bool,
         CliOption(help="Show simulated cells of three kinds, which are served meanwhile."),
@@ -103,7 +110,7 @@ def panel(
 
         audit = Audit({cell.name: cell.url for cell in served.cells})
         stack.callback(audit.close)
-        served = replace(served, audit=audit)
+        served = replace(served, audit=audit, plant=plant)
         run(served, place, lambda url: _announce(url, served, simulated))
 
 
@@ -197,6 +204,7 @@ def _served(cells_file: Path | None, names: tuple[str, ...], *, simulated: bool)
         tuple(_shown(cell, simulated=simulated) for cell in found.values()),
         {name: cell.settings.people for name, cell in found.items()},
         names,
+        groups=files.groups,
         language=language_now(),
     )
 

@@ -1,29 +1,32 @@
 """What an agent does at a cell, by the kind of a plan: nothing of it moves a robot.
 
 Each act is under the order of its job, so that it is carried out once however often it is
-delivered. This computer is the home of the cells that its cell files name: what is changed there is
-in its journal.
+delivered. This computer is the home of the cells that its cell files name, unless they say
+otherwise: what is changed there is in its journal.
 """
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
-from dataclasses import replace
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink import errors
-from robolink.errors import BusyError, ConfigError, RobolinkError
+from robolink.errors import BusyError, ConfigError, JournalError, RobolinkError, StoppedError
 from robolink.fleet import JobOutcome, Permit, Plan, PlanKind
 from robolink.fleet.errors import PlanError
+from robolink.fleet.silence import hanging
 from robolink.interrupts import ClosedAtExit
 from robolink.messages import in_english, joined, known_names, tr
-from robolink_cli.console.exit_codes import DIFFERENT, DONE, exit_code, exit_code_of
+from robolink_cli.console.exit_codes import DIFFERENT, DONE, exit_code_of
+from robolink_cli.session.cell_plans import ends_order, kept_before, outcome_of
 
 if TYPE_CHECKING:
     from robolink.config import Cell, CellFiles
     from robolink.model import Controller, Signature
     from robolink.stopping import SharedStopListener
+    from robolink.transaction import Order
 
 
 class _Job(NamedTuple):
@@ -34,6 +37,7 @@ class _Job(NamedTuple):
         cell: The cell, as its files say now.
         permit: By which permit; ``None`` for a job that changes nothing, or may not any more.
         keep_days: For how many days checks are kept.
+        line: Its connection, as those see it who watch the job.
         listener: Hears a stop from another terminal; ``None`` where that cannot be.
     """
 
@@ -41,6 +45,7 @@ class _Job(NamedTuple):
     cell: "Cell"
     permit: Permit | None
     keep_days: int
+    line: "_Line"
     listener: "SharedStopListener | None" = None
 
     @property
@@ -81,10 +86,68 @@ class _Job(NamedTuple):
         controller.latch.require_open(tr("The job"))  # a stop came while it was closing
 
     def connect(self) -> "Controller":
-        """Return the connected controller."""
+        """Return the connected controller.
+
+        Raises:
+            JournalError: The job was cut off meanwhile.
+        """
         from robolink.config import connect_cell
 
-        return connect_cell(self.cell, signature=self.signature())
+        controller = connect_cell(self.cell, signature=self.signature())
+        self.line.controller = controller  # before the look: who cuts it off does so the other way
+        if self.line.cut:
+            controller.close()
+            raise _was_cut_off()
+        return controller
+
+    @contextmanager
+    def not_cut_off(self) -> Iterator[None]:
+        """Have a job that was cut off, and wakes up, close no order: nobody decided about it.
+
+        Raises:
+            JournalError: It was cut off.
+        """
+        try:
+            yield
+        except StoppedError as error:
+            if not self.line.cut:
+                raise
+            raise _was_cut_off() from error
+
+
+@dataclass(slots=True)
+class _Line:
+    """The connection of a job.
+
+    Attributes:
+        writes: Whether the job changes something.
+        controller: The controller, from when it is connected.
+        cut: Whether the job was cut off from it.
+    """
+
+    writes: bool
+    controller: "Controller | None" = None
+    cut: bool = False
+
+    def cut_off(self, ended: Callable[[JobOutcome | None], None]) -> None:
+        """Let nothing reach the controller any more; see :class:`robolink.fleet.silence.CellLine`.
+
+        One that is only read is not stopped: production may run there.
+        """
+        self.cut = True
+        controller = self.controller
+        if controller is None:
+            ended(hanging(writes=False, settled=True, at_rest=True))  # nothing was sent
+            return
+        at_rest = not self.writes
+        controller.latch.sever()
+        with suppress(RobolinkError):
+            if self.writes:
+                controller.stop()
+                at_rest = True
+        settled = controller.ledger.outcome().settled
+        ended(hanging(writes=self.writes, settled=settled, at_rest=at_rest))
+        controller.close()  # the connection first, for others; then its record, which may hang
 
 
 class CellActs(ClosedAtExit):
@@ -104,6 +167,7 @@ class CellActs(ClosedAtExit):
         self._listener = _listener(tell)
         self._reading = threading.Lock()
         self._files: CellFiles | None = None
+        self._lines: dict[str, _Line] = {}
         self._as_of: tuple[tuple[int, int], ...] | None = None
         self._kinds: Final[Mapping[PlanKind, Callable[[_Job], JobOutcome]]] = {
             PlanKind.BACKUP: self._back_up,
@@ -119,11 +183,29 @@ class CellActs(ClosedAtExit):
 
     def __call__(self, plan: Plan, cell: str, permit: Permit | None) -> JobOutcome:
         """Carry out the job of a plan at a cell; whatever happens is an outcome."""
+        line = self._lines[plan.order(cell)] = _Line(writes=not plan.kind.reads)
         try:
             found, keep_days = self._cell(cell)
-            return self._kinds[plan.kind](_Job(plan, found, permit, keep_days, self._listener))
+            found.home.require_here()
+            job = _Job(plan, found, permit, keep_days, line, self._listener)
+            return self._kinds[plan.kind](job)
         except Exception as error:  # a defect is told, too, and ends one job
             return outcome_of(error)
+        finally:
+            del self._lines[plan.order(cell)]
+
+    def exchanges(self, order: str) -> int:
+        """Return how many requests a job has sent; see :class:`robolink.fleet.silence.CellLine`."""
+        line = self._lines.get(order)
+        return 0 if line is None or line.controller is None else line.controller.exchanges
+
+    def cut_off(self, order: str, ended: Callable[[JobOutcome | None], None]) -> None:
+        """Cut a job off from its cell; see :class:`robolink.fleet.silence.CellLine`."""
+        line = self._lines.get(order)
+        if line is None:
+            ended(None)
+        else:
+            line.cut_off(ended)
 
     def _cell(self, name: str) -> "tuple[Cell, int]":
         """Return a cell as the files say now, and for how many days checks are kept.
@@ -131,6 +213,23 @@ class CellActs(ClosedAtExit):
         Raises:
             ConfigError: There is no such cell, or a cell file is wrong.
         """
+        files = self._cell_files()
+        if name not in files.cells:
+            raise ConfigError(
+                tr("This computer has no cell {name}.", name=name),
+                remedy=known_names(tuple(files.cells), name),
+            )
+        return files.cells[name], files.keep_checks_days
+
+    def cells(self) -> "Mapping[str, Cell]":
+        """Return the cells of this computer as the files say now.
+
+        Raises:
+            ConfigError: A cell file is wrong.
+        """
+        return self._cell_files().cells
+
+    def _cell_files(self) -> "CellFiles":
         from robolink.config import config_files, load_cell_files, use_journals_of
 
         with self._reading:  # once, however many jobs begin together
@@ -138,14 +237,7 @@ class CellActs(ClosedAtExit):
             if self._files is None or now != self._as_of:
                 self._files, self._as_of = load_cell_files(), now
                 use_journals_of(self._files.cells.values(), self._files.journal)
-            files = self._files
-        cells = files.cells
-        if name not in cells:
-            raise ConfigError(
-                tr("This computer has no cell {name}.", name=name),
-                remedy=known_names(tuple(cells), name),
-            )
-        return cells[name], files.keep_checks_days
+            return self._files
 
     def _back_up(self, job: _Job) -> JobOutcome:
         """Save all tools in a file; the one that this order saved before stays as it is."""
@@ -207,30 +299,54 @@ def _drift(job: _Job) -> JobOutcome:
 
 def _write_offset(job: _Job) -> JobOutcome:
     """Write what the plan says into a tool, once; nothing is proved by it."""
-    from robolink.backup import keep_first_backup
-    from robolink.model import ToolOffset
-    from robolink.transaction import Wanted, carrying_out, change_tools
+    from robolink.transaction import carrying_out, order_on_record
 
     said = dict(job.plan.offsets[job.cell.name])
+    ordered = {"command": "fleet", **said, "tool": int(said["tool"])}
+    done, kept = JobOutcome(DONE, what="Written and read back."), False
+    try:
+        with (
+            job.connected() as controller,
+            carrying_out(controller, job.order, ordered, ends=ends_order) as order,
+            job.not_cut_off(),
+        ):
+            if order.done is not None:
+                done, kept = replace(done, what="Written before.", change=order.done.change), True
+            else:
+                try:
+                    _write(job, controller, order, said)
+                finally:
+                    with suppress(RobolinkError):  # else it counts as what ended it
+                        kept = order_on_record(controller.outcomes, order.id, order.job) is not None
+    except Exception as error:  # a stop, say, while the controller is closed
+        return kept_before(done if kept else None, error)
+    return done
+
+
+def _write(job: _Job, controller: "Controller", order: "Order", said: dict[str, float]) -> None:
+    """Write an offset; see :func:`_write_offset`."""
+    from robolink.backup import keep_first_backup
+    from robolink.model import ToolOffset
+    from robolink.transaction import Wanted, change_tools
+
+    if job.permit is None:
+        raise BusyError(
+            tr("Nothing was written: the plan may not begin anything now."),
+            remedy=tr("It is tried again when the plan may go on."),
+        )
     tool = int(said.pop("tool"))
-    with (
-        job.connected() as controller,
-        carrying_out(controller, job.order, {"command": "fleet", "tool": tool, **said}) as order,
-    ):
-        if order.done is not None:
-            return JobOutcome(DONE, what="Written before.", change=order.done.change)
-        if job.permit is None:
-            raise BusyError(
-                tr("Nothing was written: the plan may not begin anything now."),
-                remedy=tr("It is tried again when the plan may go on."),
-            )
-        controller.tools.require_writable(tool)
-        before = controller.tools.read(tool)
-        kept = ToolOffset() if before is None or before.of_no_tool else before
-        keep_first_backup(controller, tell=lambda _sentence: None)
-        wanted = Wanted(tool, replace(kept, **said), before)
-        change_tools(controller, [wanted], order=order)
-        return JobOutcome(DONE, what="Written and read back.")
+    controller.tools.require_writable(tool)
+    before = controller.tools.read(tool)
+    now = ToolOffset() if before is None or before.of_no_tool else before
+    keep_first_backup(controller, tell=lambda _sentence: None)
+    change_tools(controller, [Wanted(tool, replace(now, **said), before)], order=order)
+
+
+def _was_cut_off() -> JournalError:
+    return JournalError(
+        tr("The job had given no sign of life, and was cut off from its cell."),
+        remedy=tr("Look at this computer's disks, then resume the plan."),
+    )
 
 
 def _listener(tell: Callable[[str], None]) -> "SharedStopListener | None":
@@ -238,34 +354,8 @@ def _listener(tell: Callable[[str], None]) -> "SharedStopListener | None":
     from robolink.journal import this_process
     from robolink.stopping import SharedStopListener
 
-    who = this_process().os_user or "?"
-    try:
-        return SharedStopListener(
-            who=tr("{who} (plans of many cells)", who=who),
-            heard=lambda url, by: tell(
-                tr("{url}: stopped from another terminal by {who}.", url=url, who=by)
-            ),
-        )
-    except OSError as error:
-        tell(
-            tr(
-                "'robolink stop' in another terminal cannot reach this command: {cause}.",
-                cause=error.strerror or error,
-            )
-        )
-        return None
-
-
-def outcome_of(error: BaseException) -> JobOutcome:
-    """Return what an error means for a job."""
-    what = getattr(error, "what", "") or f"{type(error).__name__}: {error}"
-    reason = getattr(error, "reason", None)
-    return JobOutcome(
-        exit_code(error),
-        error=type(error).__name__,
-        reason="" if reason is None else str(reason),
-        what=in_english(what),
-    )
+    who = tr("{who} (plans of many cells)", who=this_process().os_user or "?")
+    return SharedStopListener.telling(tell, who=who)
 
 
 def _found(sentences: list[str]) -> JobOutcome:

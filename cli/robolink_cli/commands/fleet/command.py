@@ -13,6 +13,10 @@ _COMMANDS: Final = {
         f"{_HERE}.run:run",
         declared("Start a plan; carry it out here if no agent runs."),
     ),
+    "next": (
+        f"{_HERE}.next:next_job",
+        declared("Carry out the job that a plan has for this cell."),
+    ),
     "status": (
         f"{_HERE}.status:status",
         declared("Show how plans stand, and what each job waits for."),
@@ -26,6 +30,10 @@ _COMMANDS: Final = {
     "agent": (
         f"{_HERE}.agent:agent",
         declared("Carry out the plans of a plant, until it is ended."),
+    ),
+    "report": (
+        f"{_HERE}.report:report",
+        declared("Write a page about a plant: drift, recipes, plans."),
     ),
     "demo": (
         f"{_HERE}.demo:demo",

@@ -46,7 +46,10 @@ def give(
     group: Annotated[
         str | None,
         LINE,
-        CliOption(metavar="NAME", help="Only plans that wait for this group of permits."),
+        CliOption(
+            metavar="NAME",
+            help="Only plans and orders that wait for this group of permits; all unless given.",
+        ),
     ] = None,
     plan: Annotated[str | None, LINE, CliOption(metavar="PLAN", help="Only this plan.")] = None,
     operator: Operator = None,

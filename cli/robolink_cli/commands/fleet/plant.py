@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from click import Context, Parameter
     from click.shell_completion import CompletionItem
 
-    from robolink.fleet import FleetStore
+    from robolink.fleet import LineJobStore
 
 Operator = Annotated[
     str | None,
@@ -41,7 +41,7 @@ PlanId = Annotated[str, CliArgument(metavar="PLAN", shell_complete=_complete_pla
 AnyPlanId = Annotated[str | None, CliArgument(metavar="[PLAN]", shell_complete=_complete_plan)]
 
 
-def open_plant(*, missing_ok: bool = False) -> "FleetStore":
+def open_plant(*, missing_ok: bool = False) -> "LineJobStore":
     """Return the plant's database.
 
     Args:
@@ -51,9 +51,9 @@ def open_plant(*, missing_ok: bool = False) -> "FleetStore":
         PlanError: No plan was made yet.
         PlantError: What names it names none.
     """
-    from robolink.fleet import FleetStore, PlanError, default_plant
+    from robolink.fleet import LineJobStore, PlanError, default_plant
 
-    store = FleetStore(default_plant())
+    store = LineJobStore(default_plant())
     if not (missing_ok or store.made):
         raise PlanError(
             tr("There is no plan yet."),
@@ -72,8 +72,9 @@ def who(operator: str | None) -> str:
     return f"{operator} ({place})" if operator else place
 
 
-def no_agent() -> str:
+def begun_at_cells(plan: str) -> str:
     """Return what a person is told of a plan that moves robots."""
     return tr(
-        "It moves robots: no agent carries it out, a program of the plant does (docs/fleet.md)."
+        "It moves robots, so a person begins it at each cell: robolink -c CELL fleet next {plan}",
+        plan=plan,
     )

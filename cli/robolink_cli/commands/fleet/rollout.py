@@ -6,19 +6,22 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from robolink.errors import ConfigError
 from robolink.fleet import FleetStore, HaltRule, JobState, Permit, Plan, PlanProgress, plan_of
+from robolink.fleet.errors import PlantError
 from robolink.fleet.plans import SCHEMA
-from robolink.messages import tr
+from robolink.messages import listed, tr
 
 if TYPE_CHECKING:
     from robolink.model import OutcomeLog
+
+T = TypeVar("T")
 
 TOOL: Final = 1
 PLANT: Final = "demo"
@@ -34,6 +37,7 @@ class RolloutCount:
 
     Attributes:
         kills: How often the agent was killed.
+        restarts: How often an agent that had ended by itself was started anew.
         recovered: Cells at which a person had to recover, in that order.
         pauses: How often a person let the next ring begin.
         restart_s: For each kill, seconds from the start of the next agent to its first outcome.
@@ -41,6 +45,7 @@ class RolloutCount:
     """
 
     kills: int = 0
+    restarts: int = 0
     recovered: list[str] = field(default_factory=list)
     pauses: int = 0
     restart_s: list[float] = field(default_factory=list)
@@ -58,6 +63,14 @@ class Rollout:
         database: The plant's database; a file in the folder unless given.
         program: The words that start ``robolink``, of the n-th agent from 0 on.
         tell: Receives sentences for people.
+        window: Of the plan.
+        accepts: Rules whose halts the person lifts too, at once.
+        restarts: Whether an agent that ends by itself is started anew, as a service is.
+        longest_s: Longest time without any progress, in s.
+        environment: Further variables of the agent.
+
+    Attributes:
+        agent: The process that carries the plan out now.
     """
 
     def __init__(
@@ -74,12 +87,20 @@ class Rollout:
             "robolink_cli",
         ),
         tell: Callable[[str], None] = lambda _sentence: None,
+        window: str = "",
+        accepts: Iterable[HaltRule] = (),
+        restarts: bool = False,
+        longest_s: float = _MOST_S,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         self._folder, self._urls, self._x_mm, self._tell = folder, urls, x_mm, tell
         self._rings, self._program, self._lives = list(rings), program, 0
         self.database = database or str(folder / "fleet.db")
         self.count = RolloutCount()
-        self._agent: subprocess.Popen[bytes] | None = None
+        self.agent: subprocess.Popen[bytes] | None = None
+        self._window, self._restarts, self._longest_s = window, restarts, longest_s
+        self._lifts = frozenset({HaltRule.PAUSE, HaltRule.UNSETTLED, *accepts})
+        self._environment = dict(environment or {})
 
     def make(self) -> Plan:
         """Write the cell file, make the plan and permit it."""
@@ -95,6 +116,8 @@ class Rollout:
             "rings": self._rings,
             "offsets": {name: {"tool": TOOL, "x_mm": self._x_mm} for name in self._urls},
         }
+        if self._window:
+            table["window"] = self._window
         plan = plan_of(
             table,
             cells=list(self._urls),
@@ -109,7 +132,7 @@ class Rollout:
                     PLANT,
                     _PERSON,
                     "engineer",
-                    _label(now - timedelta(hours=1)),
+                    _label(now - timedelta(days=2)),
                     _label(now + timedelta(days=2)),
                     given_by=_PERSON,
                 )
@@ -121,15 +144,16 @@ class Rollout:
 
         Args:
             plan: The plan.
-            kill_now: Asked at each look whether the agent is to be killed.
+            kill_now: Called at each look; says whether the agent is to be killed. It may do
+                anything else to it, too, and take its time.
         """
         begun_s = seen_s = started_s = time.monotonic()
         ended = awaited = 0
         with FleetStore(self.database) as store:
-            self._start()
+            self.agent = self.start_agent()
             try:
                 while True:
-                    progress = store.progress(plan.id)
+                    progress = _answered(lambda: store.progress(plan.id), self._longest_s)
                     now_s = time.monotonic()
                     over = sum(job.state.final for job in progress.jobs)
                     if over != ended:
@@ -141,23 +165,26 @@ class Rollout:
                     if progress.standing:
                         self._be_the_person(store, progress)
                         seen_s = time.monotonic()
-                    elif self._was_killed() or kill_now(progress):
-                        self._kill()
-                        self._start()
+                    elif self._fell(lambda: kill_now(progress)):  # noqa: B023 - called at once
+                        self.agent = self.start_agent()
                         started_s = seen_s = time.monotonic()
                         awaited = 1
-                    elif now_s - seen_s > _MOST_S or self._ended():
+                    elif now_s - seen_s > self._longest_s or self._ended():
                         log = (self._folder / "agent.log").read_text(errors="replace")
                         raise RuntimeError(tr("The agent does not go on. {log}", log=log[-2000:]))
+                    else:  # what was done to it meanwhile is no silence of its own
+                        seen_s += time.monotonic() - now_s
                     time.sleep(0.05 + len(self._urls) / 10_000)
             finally:
-                self._kill(last=True)
+                self._kill()
         self.count.seconds = time.monotonic() - begun_s
         return progress
 
-    def _start(self) -> None:
+    def start_agent(self) -> subprocess.Popen[bytes]:
+        """Start an agent of the plant, the present one or another beside it."""
         environment = {
             **os.environ,
+            **self._environment,
             "ROBOLINK_CONFIG": str(self._folder / "robolink.toml"),
             "ROBOLINK_PLANT": self.database,
             "ROBOLINK_STATE_DIR": str(self._folder / "state"),
@@ -166,7 +193,7 @@ class Rollout:
         command = [*self._program(self._lives), "fleet", "agent", PLANT]
         self._lives += 1
         with (self._folder / "agent.log").open("ab") as log:
-            self._agent = subprocess.Popen(
+            return subprocess.Popen(
                 command,
                 env=environment,
                 stdin=subprocess.DEVNULL,
@@ -174,25 +201,36 @@ class Rollout:
                 stderr=log,
             )
 
-    def _was_killed(self) -> bool:
-        """Whether the agent was killed by somebody else."""
-        return self._agent is not None and self._agent.poll() == -signal.SIGKILL
+    def _fell(self, kill_now: Callable[[], bool]) -> bool:
+        """Whether the agent was killed, here or by itself, or ended and is to be replaced."""
+        if kill_now() or (self.agent is not None and self.agent.poll() == -signal.SIGKILL):
+            self._kill()
+            self.count.kills += 1
+            return True
+        if self._restarts and self._ended():
+            self.count.restarts += 1
+            return True
+        return False
 
     def _ended(self) -> bool:
-        return self._agent is None or self._agent.poll() is not None
+        return self.agent is None or self.agent.poll() is not None
 
-    def _kill(self, *, last: bool = False) -> None:
-        agent, self._agent = self._agent, None
+    def _kill(self) -> None:
+        agent, self.agent = self.agent, None
         if agent is not None:
             agent.kill()
             agent.wait()
-            self.count.kills += not last
 
     def _be_the_person(self, store: FleetStore, progress: PlanProgress) -> None:
         """Do what a halted plan waits for, and let it go on."""
         rules = {halt.rule for halt in progress.standing}
-        if rules - {HaltRule.PAUSE, HaltRule.UNSETTLED}:
-            raise RuntimeError(tr("The plan is halted: {rules}.", rules=", ".join(sorted(rules))))
+        if rules - self._lifts:
+            said = [
+                f"{job.cell}: {job.what}" for job in progress.jobs if job.state.final and job.what
+            ]
+            raise RuntimeError(
+                listed(tr("The plan is halted: {rules}.", rules=", ".join(sorted(rules))), said)
+            )
         unsettled = [job.cell for job in progress.jobs if job.state is JobState.UNSETTLED]
         for cell in unsettled:
             self._recover(cell)
@@ -201,7 +239,7 @@ class Rollout:
         reason = tr("recovered: {cells}", cells=", ".join(unsettled)) if unsettled else tr("looked")
         if unsettled:
             self._tell(reason)
-        store.resume(progress.plan.id, _PERSON, reason)
+        _answered(lambda: store.resume(progress.plan.id, _PERSON, reason), self._longest_s)
 
     def _recover(self, cell: str) -> None:
         import robolink
@@ -223,6 +261,18 @@ class Rollout:
         journal = open_journal(str(self._folder / "state" / "journal.db"))
         address = parse_url(self._urls[cell]).address
         return journal.log(address, signature=signature_here(__version__))
+
+
+def _answered(ask: Callable[[], T], longest_s: float) -> T:
+    """Ask the plant's database until it answers, as a person would."""
+    until = time.monotonic() + longest_s
+    while True:
+        try:
+            return ask()
+        except PlantError:
+            if time.monotonic() > until:
+                raise
+            time.sleep(0.5)
 
 
 def _label(at: datetime) -> str:

@@ -7,18 +7,17 @@ import click
 from robolink.errors import LeaseHeldError
 from robolink.fleet.errors import PlanError
 from robolink.messages import listed, tr
-from robolink_cli.commands.fleet.agent import Backups, agent_here, ended_by_signals
-from robolink_cli.commands.fleet.plant import Operator, PlanId, open_plant, who
+from robolink_cli.commands.fleet.agent import Backups, agent_here, ended_by_signals, leave
+from robolink_cli.commands.fleet.plant import Operator, PlanId, begun_at_cells, open_plant, who
 from robolink_cli.console.exit_codes import DIFFERENT, DONE, UNKNOWN
 from robolink_cli.console.render import emit, say
 from robolink_cli.options.shared import json_option
 from robolink_cli.views.fleet import progress_payload, show_progress
 
 if TYPE_CHECKING:
-    from robolink.fleet import FleetStore, Plan, PlanProgress
+    from robolink.fleet import FleetStore, PlanProgress
 
-
-_SHOWN: Final = ("plan", "finished", "states", "halts")
+_SHOWN: Final = ("plan", "finished", "states", "halts", "homes")
 
 
 @click.command("run", short_help="Start a plan; carry it out here if no agent runs.")
@@ -26,41 +25,29 @@ _SHOWN: Final = ("plan", "finished", "states", "halts")
 def run(*, plan: PlanId, backups: Backups = None, operator: Operator = None) -> int:
     """Start PLAN. If an agent of its plant runs, that one carries it out, and this ends at once.
 
-    Otherwise this command is the agent until the plan is finished or waits for a person, a permit
-    or its window. Exit code 1 when not every cell did what was asked: it ended otherwise or waits,
-    or the plan is halted; 6 when one is unsettled.
+    Otherwise this command is the agent until the plan is finished or waits for a person, a permit,
+    its window or the agent of another home, which is named. A plan that moves robots is only
+    started: at each cell a person begins its job. Exit code 1 when not every cell did what was
+    asked: it ended otherwise or waits, or the plan is halted; 6 when one is unsettled.
     """
     with open_plant() as store:
         found = store.plan(plan)
-        require_unattended(found)
         holder = ""
-        with agent_here(found.plant, backups) as agent:
+        agent = None
+        if found.kind.moves:
             start(store, plan, who(operator))
-            try:
-                with ended_by_signals(agent):
-                    agent.run_until_still()
-            except LeaseHeldError as error:
-                holder = error.holder
+        else:
+            with agent_here(found.plant, backups) as agent:
+                start(store, plan, who(operator))
+                try:
+                    with ended_by_signals(agent):
+                        agent.run_until_still()
+                except LeaseHeldError as error:
+                    holder = error.holder
         progress = store.progress(plan)
     emit("fleet-run", _payload(progress, holder), lambda: _show(progress, holder))
-    return DONE if holder else _code(progress)
-
-
-def require_unattended(plan: "Plan") -> None:
-    """Refuse a plan that no agent carries out.
-
-    Raises:
-        PlanError: It moves robots.
-    """
-    if plan.kind.moves:
-        raise PlanError(
-            tr(
-                "Plan {plan} ({kind}) moves robots, which no agent does: each cell needs a yes.",
-                plan=plan.id,
-                kind=plan.kind,
-            ),
-            remedy=tr("Nothing was started. A program of the plant carries it out: docs/fleet.md"),
-        )
+    code = DONE if holder else _code(progress)
+    return code if agent is None else leave(agent, code)
 
 
 def start(store: "FleetStore", plan: str, by: str) -> None:
@@ -93,6 +80,8 @@ def _payload(progress: "PlanProgress", holder: str) -> dict[str, object]:
 
 def _show(progress: "PlanProgress", holder: str) -> None:
     show_progress(progress)
+    if progress.plan.kind.moves and not progress.finished:
+        say(begun_at_cells(progress.plan.id))
     if holder:
         say(tr("{who} carries it out.", who=holder))
 

@@ -276,6 +276,20 @@ class Access:
             return tr("The PIN was given more than 15 minutes ago. Give it again.")
         return ""
 
+    def why_no_engineer(self, tablet: Tablet) -> str:
+        """Return why a tablet may not do what takes an engineer of any cell; empty where it may.
+
+        Args:
+            tablet: The tablet, which is paired.
+        """
+        if tablet.session is None:
+            return tr("Log in with your PIN first.")
+        if self.highest_role(tablet.session.who) is not PersonRole.ENGINEER:
+            return tr("This takes an engineer.")
+        if not self.logins.is_fresh(tablet.session):
+            return tr("The PIN was given more than 15 minutes ago. Give it again.")
+        return ""
+
     def why_not_answer(self, tablet: Tablet, cell: str, begun_by: str) -> str:
         """Return why a tablet may not answer a job; empty where it may.
 
@@ -355,7 +369,10 @@ class Access:
 
     def too_often(self, visit: Visit, kind: str, a_second: float) -> bool:
         """Count something, and return whether it came too often."""
-        key = f"{kind} {visit.tablet or network_of(visit.address)}"
+        return self.too_often_of(f"{kind} {visit.tablet or network_of(visit.address)}", a_second)
+
+    def too_often_of(self, key: str, a_second: float) -> bool:
+        """Count something under a name of its own, and return whether it came too often."""
         now_ns = self.clock.now_ns()
         left, at_ns = self._rates.pop(key, (a_second, now_ns))
         left = min(a_second, left + (now_ns - at_ns) / NS_PER_S * a_second)

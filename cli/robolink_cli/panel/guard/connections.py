@@ -28,6 +28,9 @@ STRANGERS: Final = 20
 OF_A_TABLET: Final = 24
 """Known connections of one tablet: six open pages of one browser are twelve."""
 
+OF_LINES: Final = 20
+"""Connections of line computers, beside all others: they take no tablet's place."""
+
 STRANGER_S: Final = 8.0
 """How long a connection may be a stranger, in seconds."""
 
@@ -66,6 +69,7 @@ class TabletConnection:
         close: Closes it, from outside.
         since_s: When it came, monotonic.
         tablet: Id of the tablet of a known one, which may be empty; ``None`` of a stranger.
+        line: Whether it is a line computer's.
     """
 
     peer: Peer
@@ -73,6 +77,7 @@ class TabletConnection:
     close: Callable[[], None]
     since_s: float
     tablet: str | None = None
+    line: bool = False
 
 
 @dataclass(slots=True)
@@ -128,11 +133,29 @@ class Connections:
         connection = self._open.get(peer)
         if connection is None or connection.tablet is not None:
             return True  # not accepted by our socket, as in a test; or known already
-        known = [one.tablet for one in self._open.values() if one.tablet is not None]
+        known = [one.tablet for one in self._all() if one.tablet is not None]
         if len(known) >= MOST - STRANGERS or (tablet and known.count(tablet) >= OF_A_TABLET):
             return False
         connection.tablet = tablet
         return True
+
+    def let_line_in(self, peer: Peer) -> bool:
+        """Note that a line computer's request was let in; False where it has no place.
+
+        Args:
+            peer: Its far end.
+        """
+        connection = self._open.get(peer)
+        if connection is None or connection.line:
+            return True
+        if sum(one.line for one in self._open.values()) >= OF_LINES:
+            return False
+        connection.line, connection.tablet = True, ""
+        return True
+
+    def _all(self) -> list[TabletConnection]:
+        """Return the connections but those of line computers."""
+        return [one for one in self._open.values() if not one.line]
 
     def went(self, connection: "TabletConnection") -> None:
         """Note that a connection has ended; its far end may be another's by now."""

@@ -3,9 +3,10 @@
 import asyncio
 import json
 import re
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import partial
 from hmac import compare_digest
 from http import HTTPStatus
 from typing import Any, Final
@@ -14,6 +15,8 @@ from urllib.parse import parse_qs
 from robolink.messages import tr
 from robolink.model import PersonRole
 from robolink_cli.panel.guard.access import COMMANDS_A_SECOND, Access, Visit
+from robolink_cli.panel.guard.line_gate import LineGate, Orders, is_of_lines
+from robolink_cli.panel.guard.line_tokens import LineTokens
 from robolink_cli.panel.guard.live import Live, Lives
 from robolink_cli.panel.guard.pairing import tablet_id
 from robolink_cli.panel.guard.requests import MOST_BYTES, Denial, PageRequest, parsed
@@ -67,6 +70,8 @@ class Right(Enum):
     """A paired tablet and the token of its page."""
     PERSON = auto()
     """Also a person of the cell who is logged in."""
+    ENGINEER = auto()
+    """Also an engineer of some cell, with a PIN of the last 15 minutes."""
     COMMAND = auto()
     """Also the seat of the cell, and a PIN of the last 15 minutes."""
 
@@ -81,6 +86,8 @@ POSTS: Final = {
     "/seat": Right.PERSON,
     "/seat/leave": Right.TOKEN,
     "/start": Right.COMMAND,
+    "/plan/halt": Right.ENGINEER,
+    "/plan/resume": Right.ENGINEER,
 }
 """All that can be posted; what is not here there is not."""
 
@@ -90,26 +97,32 @@ _BEFORE_PAIRING: Final = ("/pair", "/static/")
 """What a tablet sees before it is paired."""
 
 
-def guarded(app: App, access: Access) -> App:
+def guarded(app: App, access: Access, orders: Orders | None = None) -> App:
     """Return the panel with its gate.
 
     Args:
         app: The panel.
         access: Who may do what.
+        orders: Takes what line computers order; ``None`` where nobody does.
     """
-    return _Gate(app, access)
+    return _Gate(app, access, orders)
 
 
 class _Gate:
-    def __init__(self, app: App, access: Access) -> None:
+    def __init__(self, app: App, access: Access, orders: Orders | None) -> None:
         self._app, self._access = app, access
         self._lives = Lives()
+        self._lines = LineGate(access, orders, LineTokens())
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
         request = PageRequest(scope)
+        if is_of_lines(request):
+            body = partial(_body, request, receive)
+            await self._lines.answer(request, body, partial(_line_answer, send))
+            return
         visit = self._access.visit(request)
         with self._access.speaking(visit.tablet):
             if request.live:
@@ -191,6 +204,9 @@ class _Gate:
         token = access.token_of(request.scope)
         if not _same(request.one(b"x-robolink-token"), token):
             return Denial(403, tr("This page is out of date. Load it again."), "token")
+        if need is Right.ENGINEER:
+            why = access.why_no_engineer(access.tablet_of(request.scope))
+            return Denial(403, why, "person") if why else None
         return None
 
     def _command(self, request: PageRequest, cell: object, need: Right) -> Denial | None:
@@ -376,6 +392,23 @@ class _Answer:
         if _REPORT.fullmatch(self.request.path):
             headers[b"content-security-policy"] = REPORT_SECURITY.encode()
         return [*kept, *headers.items()]
+
+
+async def _line_answer(
+    send: Send, status: int, document: Mapping[str, object], more: tuple[tuple[str, str], ...]
+) -> None:
+    """Answer a line computer, and close: it comes again when it has something to order."""
+    data = json.dumps(document).encode()
+    headers = {
+        **_HEADERS,
+        b"content-type": b"application/json",
+        b"content-length": str(len(data)).encode(),
+        b"connection": b"close",
+        **{name.lower().encode(): value.encode() for name, value in more},
+    }
+    async with asyncio.timeout(TAKEN_S):
+        await send({"type": "http.response.start", "status": status, "headers": [*headers.items()]})
+        await send({"type": "http.response.body", "body": data})
 
 
 async def _body(request: PageRequest, receive: Receive) -> tuple[bytes, Denial | None]:

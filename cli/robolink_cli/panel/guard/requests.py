@@ -78,6 +78,19 @@ class PageRequest:
         return [value.strip() for key, _, value in pairs if key.strip() == name]
 
     def misdirected(self, hosts: Collection[str], port: int) -> Denial | None:
+        """Refuse a request by a name that is not this panel's, past a proxy, or for an odd path.
+
+        Args:
+            hosts: As of :meth:`misaddressed`.
+            port: Where it listens.
+        """
+        if refusal := self.misaddressed(hosts, port):
+            return refusal
+        if _ODD_PATH.search(self.path):
+            return Denial(404, tr("There is no such page."), "path")
+        return None
+
+    def misaddressed(self, hosts: Collection[str], port: int) -> Denial | None:
         """Refuse a request by a name that is not this panel's, or past a proxy.
 
         Args:
@@ -93,8 +106,6 @@ class PageRequest:
             return Denial(403, why, "proxy")
         if len(self.path) + len(self.scope["query_string"]) > _MOST_TARGET:
             return Denial(414, tr("The address is too long."), "path")
-        if _ODD_PATH.search(self.path):
-            return Denial(404, tr("There is no such page."), "path")
         return None
 
     def foreign(self, *, strict: bool) -> Denial | None:

@@ -25,7 +25,8 @@ function connect() {
   begun = now();
   tries += 1;
   fresh = shown = ended = false;
-  const made = new WebSocket(data.cell ? `${address}?cell=${encodeURIComponent(data.cell)}` : address);
+  const query = data.cell ? `cell=${encodeURIComponent(data.cell)}` : data.query;
+  const made = new WebSocket(query ? `${address}?${query}` : address);
   socket = made;
   made.onmessage = (event) => { if (made === socket) hear(JSON.parse(event.data)); };
   made.onclose = (event) => { if (made === socket) closed(event.code); };

@@ -179,11 +179,15 @@ def last_screen(state: WizardState, error: BaseException | None, at_s: float) ->
     if ended is not None:
         return ended
     if error is None:
-        return LastScreen(True, state.fresh or state.remarks, (), at_s, tr("DONE"))
+        told = (*state.fresh, *state.closing) or state.remarks
+        return LastScreen(True, told, state.closing, at_s, tr("DONE"))
     if isinstance(error, RobolinkError):
-        said = [one for one in stopped_lines(state, error) if one]
+        said = [one for one in (*stopped_lines(state, error), *state.closing) if one]
         blocked = is_blocked(error)
         headed = headed_of(state, error)
-        return LastScreen(False, tuple(said), (), at_s, headed, again=not blocked, blocked=blocked)
+        kept = state.closing
+        return LastScreen(
+            False, tuple(said), kept, at_s, headed, again=not blocked, blocked=blocked
+        )
     why = tr("You ended it.") if isinstance(error, KeyboardInterrupt) else str(error)
     return LastScreen(False, (why,), (), at_s, tr("STOPPED"), again=False)

@@ -11,6 +11,7 @@ from typing import Final
 from robolink.messages import declared, joined, spoken, tr
 
 TITLES: Final[Mapping[str, str]] = {
+    "plan": declared("Carry out the job of a plan"),
     "change": declared("Change a needle or nozzle"),
     "recover": declared("Finish or undo the interrupted job"),
     "release": declared("Allow movement again after a stop."),
@@ -21,6 +22,7 @@ TITLES: Final[Mapping[str, str]] = {
 """What the jobs of a page are called, in English, by their names."""
 
 _WORDS: Final[Mapping[str, str]] = {
+    "fleet next": "plan",
     "change": "change",
     "recalibrate": "change",
     "recover": "recover",
@@ -45,7 +47,7 @@ _TAKES_NONE: Final = frozenset({"recover", "release", "check", "undo"})
 
 _OTHER: Final = re.compile(
     rf"robolink{_CELL} (?:recover|resolve|robot|tool|cell|journal|calibrate|change|status|undo|"
-    r"check|stop|panel|plc|spel|expert|demo)\b"
+    r"check|stop|panel|plc|spel|expert|demo|fleet)\b"
 )
 
 

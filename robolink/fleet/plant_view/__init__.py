@@ -1,0 +1,1 @@
+"""What a plant sees of its cells: their state, metrics, messages, a report."""

@@ -39,6 +39,7 @@ _PROGRAMS: Final = (
     "robolink_cli.job_process",
     "robolink_cli.panel.stop",
     "tests.contract._own_window",
+    "tests.fleet._killed_next",
 )
 _STARTS_OTHERS: Final = "panel"
 """The command that leaves a copy of itself to be forked."""

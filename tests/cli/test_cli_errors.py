@@ -46,6 +46,7 @@ CODES = {
     "NotComparedError": 2,
     "DocumentError": 2,
     "JournalError": 2,
+    "NotAtHomeError": 2,
     "TransportError": 3,
     "ConnectError": 3,
     "LoginUnansweredError": 3,

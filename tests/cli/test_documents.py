@@ -23,7 +23,7 @@ PRINTS_NO_DOCUMENT = {"expert completion"}
 GROUPS_THAT_SHOW = {"cell accuracy", "panel"}
 BEHIND_AN_EMIT = re.compile(r'(?<!events\.)(?<!self\.)\bemit\(\s*"([a-z-]+)"')
 WHOLE = re.compile(r'"robolink/([a-z-]+)/(\d+)')
-READ_NOT_PRINTED = {"panel-tablet-1", "sim-cells-1"}
+READ_NOT_PRINTED = {"line-job-1", "line-token-1", "panel-tablet-1", "sim-cells-1"}
 
 
 def commands():

@@ -1,8 +1,9 @@
 """Both kinds of database of a plant, empty for each test, and a clock that a test moves."""
 
+import os
 import secrets
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from robolink.fleet import FleetStore
 from tests.contract.journal._postgresql import Server, is_installed, served
+from tests.fleet._moving_cells import MovingCells, moving_cells
 
 
 class Wall:
@@ -94,3 +96,23 @@ def server_of(request: pytest.FixtureRequest) -> Callable[[str], AbstractContext
         hidden.rename(location)
 
     return away
+
+
+@pytest.fixture
+def cells_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, location: str
+) -> Iterator[Callable[..., MovingCells]]:
+    """Serves the cells that are named, in the cell files of this computer."""
+    for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(tmp_path / "robolink.toml"))
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.setenv("ROBOLINK_PLANT", location)
+    with ExitStack() as stack:
+        yield lambda *names: stack.enter_context(moving_cells(tmp_path, location, *names))
+
+
+@pytest.fixture
+def cells(cells_of: Callable[..., MovingCells]) -> MovingCells:
+    """Two cells."""
+    return cells_of("a", "b")

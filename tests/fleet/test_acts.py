@@ -8,14 +8,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from robolink_cli.commands.fleet.acts import CellActs, outcome_of
+from robolink_cli.commands.fleet.acts import CellActs
+from robolink_cli.session.cell_plans import outcome_of
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
+from robolink import transaction
 from robolink.errors import ConnectError
 from robolink.fleet import Permit, Treatment, plan_of, treatment_of
-from robolink.journal import default_location, open_journal
+from robolink.journal import default_location, open_journal, this_computer
 from robolink.model import EntryKind, MarkerKind, ToolOffset
 from robolink.stopping import holders_of
 from robolink.transport import far_end_of, parse_url
@@ -77,6 +79,56 @@ def test_an_offset_is_written_once_however_often_it_is_delivered(acts, simulator
     assert entry.details["order"] == made.order("a")
     assert entry.signature.operator == "Chen"
     assert simulator.machine.motions.added == 0
+
+
+@pytest.fixture
+def disturbed(monkeypatch):
+    """Has something happen just before the next write, or just after it."""
+    change_tools = transaction.change_tools
+
+    def by(happening, *, after):
+        def change(controller, *args, **kwargs):
+            monkeypatch.setattr(transaction, "change_tools", change_tools)
+            if not after:
+                happening(controller)
+            receipts = change_tools(controller, *args, **kwargs)
+            happening(controller)
+            return receipts
+
+        monkeypatch.setattr(transaction, "change_tools", change)
+
+    return by
+
+
+def stopped_by_an_error(controller):
+    controller.stop()
+    controller.latch.require_open("test")
+
+
+@pytest.mark.parametrize("stop", [lambda controller: controller.stop(), stopped_by_an_error])
+def test_a_stop_after_an_offset_is_kept_takes_nothing_back(acts, simulator, disturbed, stop):
+    made = plan("offset")
+    disturbed(stop, after=True)
+    ended = acts(made, "a", PERMIT)
+    assert (ended.code, ended.error, treatment(ended)) == (0, "", Treatment.DONE)
+    assert "ended by a stop" in ended.what
+    assert acts(made, "a", PERMIT).what == "Written before."
+    assert simulator.machine.flash_writes == 1
+
+
+@pytest.mark.parametrize("defect", [ZeroDivisionError("a defect"), OSError(28, "no space left")])
+def test_what_ends_in_a_defect_is_done_by_the_next_delivery(acts, simulator, disturbed, defect):
+    def fails(_controller):
+        raise defect
+
+    made = plan("offset")
+    disturbed(fails, after=False)
+    assert treatment(acts(made, "a", PERMIT)) is Treatment.HALT
+    assert (simulator.machine.flash_writes, entries(EntryKind.ORDER)) == (0, [])
+    assert acts(made, "a", PERMIT).what == "Written and read back."
+    disturbed(fails, after=True)
+    kept = acts(plan("offset", name="2"), "a", PERMIT)
+    assert (kept.code, str(defect) in kept.what) == (0, True)
 
 
 def test_without_a_permit_an_order_is_only_looked_up(acts, simulator):
@@ -243,3 +295,15 @@ def test_a_backup_folder_that_cannot_be_written_halts_the_plan(cell_file, tmp_pa
     with CellActs(Path(tmp_path / "file")) as acts:
         ended = acts(plan("backup"), "a", None)
     assert (ended.error, treatment(ended)) == ("PlanError", Treatment.HALT)
+
+
+@pytest.mark.parametrize("kind", ["offset", "backup", "check", "drift"])
+def test_nothing_is_done_where_the_cell_file_names_another_home(kind, acts, cell_file, simulator):
+    said = cell_file.read_text()
+    cell_file.write_text(f'{said}home = "another-computer"\n')
+    away = acts(plan(kind), "a", PERMIT)
+    assert (away.code, away.error) == (2, "NotAtHomeError")
+    assert treatment(away) is Treatment.PERSON
+    assert not list(simulator.log)
+    cell_file.write_text(f'{said}home = "{this_computer()}"\n')
+    assert acts(plan(kind), "a", PERMIT).error == ""

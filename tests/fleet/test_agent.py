@@ -8,19 +8,20 @@ import sys
 import threading
 import time
 from collections import Counter
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from robolink.errors import LeaseHeldError
-from robolink.fleet import FleetStore, HaltRule, JobOutcome, JobState, plan_of
+from robolink.fleet import FleetStore, HaltRule, JobOutcome, JobState, Permit, plan_of
 from robolink.fleet.agent import Agent
 from robolink.fleet.agent_lock import AgentLock
 from robolink.fleet.errors import PlantError
 from robolink.fleet.store import statements
 from robolink.fleet.watchdog import UNIT, notify
+from robolink.journal import this_computer
 
 ROOT = Path(__file__).parents[2]
 
@@ -137,6 +138,13 @@ def states(location, made):
     return {job.cell: job.state for job in progress.jobs}, progress
 
 
+def is_refused(location):
+    """Whether another agent of this home is."""
+    with suppress(LeaseHeldError), AgentLock(location, "plant", this_computer()):
+        return False
+    return True
+
+
 def test_an_agent_carries_plans_out_and_leaves_the_rest_alone(location, tmp_path):
     recipe = tmp_path / "needle.toml"
     recipe.write_bytes((ROOT / "examples" / "recipes" / "scara-pin.toml").read_bytes())
@@ -148,7 +156,16 @@ def test_an_agent_carries_plans_out_and_leaves_the_rest_alone(location, tmp_path
             store.add_plan(one)
         store.halt(halted.id, "Li")
         permit(store)
-    Agent(location, "plant", cells).run_until_still()
+    refused = []
+
+    @contextmanager
+    def meanwhile():
+        refused.append(is_refused(location))
+        yield
+        refused.append(is_refused(location))
+
+    Agent(location, "plant", cells, meanwhile=meanwhile).run_until_still()
+    assert refused == [True, True]  # what is done meanwhile is done by one process alone
     found, _ = states(location, mine)
     assert found == {"a": JobState.KEPT, "b": JobState.KEPT, "c": JobState.REFUSED}
     assert cells.done == dict.fromkeys((mine.order(cell) for cell in "abc"), 1)
@@ -220,8 +237,8 @@ def running(agent):
         thread.join(30)
 
 
-def until(condition):
-    deadline = time.monotonic() + 30
+def until(condition, seconds=30):
+    deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.02)
@@ -300,11 +317,32 @@ def test_a_cell_that_is_off_when_the_window_closes_is_missed_then(location):
     with FleetStore(location, clock=lambda: now[0]) as store:
         store.add_plan(made)
         with running(agent):
-            until(lambda: store.progress(made.id).jobs[1].treatment)
+            until(lambda: all(job.treatment for job in store.progress(made.id).jobs))
             now[0] += timedelta(hours=7)
             until(lambda: store.progress(made.id).finished)
     found, _ = states(location, made)
     assert found == {"a": JobState.KEPT, "b": JobState.MISSED, "c": JobState.KEPT}
+
+
+def test_a_job_that_moves_a_robot_is_a_persons_and_an_agent_only_ends_it_as_missed(location):
+    """What a person tried in vain is not tried again by the agent; the window ends it."""
+    now = [datetime(2026, 11, 30, 23, 0).astimezone()]
+    recipe = str(ROOT / "examples" / "recipes" / "scara-pin.toml")
+    made = plan("recipe", recipe=recipe, rings=["rest"], window="22:00-05:00")
+    cells = Cells()
+    agent = Agent(location, "plant", cells, clock=lambda: now[0])
+    with FleetStore(location, clock=lambda: now[0]) as store:
+        store.add_plan(made)
+        ends = [str(now[0] + timedelta(days=days)).replace(" ", "T") for days in (-1, 3)]
+        store.give_permit(Permit(0, "plant", "Chen", "engineer", *ends))
+        turn = store.begin(made.id, "b")
+        store.record_outcome(made.id, "b", turn.job.attempt, JobOutcome(3, "ConnectError"))
+        with running(agent):
+            now[0] += timedelta(hours=7)
+            until(lambda: store.progress(made.id).jobs[1].state is JobState.MISSED)
+    found, _ = states(location, made)
+    assert found == {"a": JobState.WAITING, "b": JobState.MISSED, "c": JobState.WAITING}
+    assert not cells.done
 
 
 def test_a_clock_that_is_set_back_delays_no_second_try(location):
@@ -319,6 +357,19 @@ def test_a_clock_that_is_set_back_delays_no_second_try(location):
             ahead[0] -= timedelta(days=1)
             until(lambda: store.progress(made.id).finished)
     assert cells.done[made.order("b")] == 2
+
+
+def test_a_turn_without_the_database_is_none_for_those_who_watch_the_agent(tmp_path):
+    place, told = tmp_path / "plant.db", list[str]()
+    place.write_bytes(b"no database, and longer than the head of one" * 10)
+    agent = Agent(str(place), "plant", lambda *_: JobOutcome(0), tell=told.append)
+    agent._run(lambda _still: True)
+    assert len(told) == 1
+    assert agent.turned_s == 0.0
+    place.unlink()
+    agent = Agent(str(place), "plant", lambda *_: JobOutcome(0))
+    agent.run_until_still()
+    assert agent.turned_s > 0
 
 
 def test_a_unit_watches_the_agent():

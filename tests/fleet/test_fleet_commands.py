@@ -2,13 +2,23 @@
 
 import json
 import os
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
 from robolink_cli import main
+from robolink_cli.console.person import Person, person_at
 
-from robolink.fleet import FleetStore, JobOutcome, default_plant
+from robolink.fleet import (
+    CellState,
+    FleetStore,
+    JobOutcome,
+    PlanError,
+    PlantNotes,
+    RecipeInUse,
+    default_plant,
+)
 from tests.fleet._plans import carried_out, cells_of
 
 PLAN = """
@@ -75,7 +85,7 @@ def test_a_plan_is_made_kept_and_listed(run, document, plan):
 def test_a_dry_run_keeps_nothing(run, document):
     assert document("plan", "plan.toml", "--dry-run")["kept"] is False
     assert "Nothing was kept." in run("plan", "plan.toml", "--dry-run")[1]
-    assert document("status") == {"schema": "robolink/fleet-plans/1", "plans": []}
+    assert document("status") == {"schema": "robolink/fleet-plans/1", "homes": [], "plans": []}
     assert not Path(default_plant()).exists()
 
 
@@ -140,7 +150,7 @@ def test_run_says_that_not_everything_was_done(run, document, waits):
     assert document("status", made)["halts"][0]["reason"] == "started"
 
 
-def test_a_plan_that_moves_robots_says_that_no_agent_carries_it_out(run, document):
+def test_a_plan_that_moves_robots_is_started_and_begun_at_its_cells(run, document):
     recipe = Path(__file__).parents[2] / "examples" / "recipes" / "scara-pin.toml"
     Path("plan.toml").write_text(
         'schema = "robolink/fleet-plan/1"\nkind = "recipe"\nname = "n"\ncells = ["*"]\n'
@@ -148,17 +158,18 @@ def test_a_plan_that_moves_robots_says_that_no_agent_carries_it_out(run, documen
     )
     code, out, _ = run("plan", "plan.toml")
     assert code == 0
-    assert "no agent carries it out" in out
-    assert "fleet run" not in out
     made = document("status")["plans"][0]["plan"]
-    assert f"robolink fleet resume {made} --reason" in out
-    assert f"not started yet: robolink fleet resume {made}" in run("status", made)[1]
-    code, _, err = run("run", made)
-    assert code == 2
-    assert "A program of the plant carries it out" in err
-    code, out, _ = run("resume", made, "--reason", "the program runs")
-    assert code == 0
-    assert "no agent carries it out" in out
+    begun = f"robolink -c CELL fleet next {made}"
+    assert begun in out
+    assert f"robolink fleet run {made}" in out
+    assert f"not started yet: robolink fleet run {made}" in run("status", made)[1]
+    code, out, _ = run("run", made)
+    assert (code, begun in out) == (1, True)
+    (started,) = document("status", made)["halts"]
+    assert (started["rule"], started["reason"]) == ("pause", "started")
+    document("halt", made)
+    code, out, _ = run("resume", made, "--reason", "the line runs")
+    assert (code, begun in out) == (0, True)
 
 
 def test_run_lifts_no_halt_of_a_person(run, document):
@@ -229,3 +240,98 @@ def test_a_database_that_cannot_be_used_is_named_without_its_password(run, monke
     assert code == 2
     assert "The plant's database postgresql+psycopg://li:***@127.0.0.1:1/plant cannot be" in err
     assert "secret-7" not in err
+
+
+def test_an_agent_whose_plant_is_not_named_is_that_of_the_plant_called_plant(run):
+    code, out, err = run("agent", "--systemd")
+    assert (code, err) == (0, "")
+    assert "Description=robolink: the agent of plant plant" in out
+    assert " fleet agent plant\n" in out
+
+
+def test_the_cells_of_a_plant_are_shown_with_their_recipes(run, document):
+    assert document("status", "--cells", "plant") == {
+        "schema": "robolink/fleet-cells/1",
+        "plant": "plant",
+        "cells": [],
+    }
+    assert "Nothing was noted of any cell yet" in run("status", "--cells", "plant")[1]
+    recipe = RecipeInUse("needle", "ab" * 32, "2026-11-30T22:00:00+00:00")
+    state = CellState("epson:C-1/R-1", changes={"done": 3}, recipe=recipe)
+    begun = replace(state, unsettled_since="2026-11-30T22:10:00+00:00")
+    with PlantNotes(default_plant(), "plant") as notes:
+        notes.note({"line3-a": state, "line3-b": begun}, {})
+    first, second = document("status", "--cells", "plant")["cells"]
+    assert (first["cell"], first["recipe"]["hash"]) == ("line3-a", "ab" * 32)
+    assert (first["changes"]["done"], first["unsettled_since"]) == (3, None)
+    assert second["unsettled_since"] == "2026-11-30T22:10:00+00:00"
+    out = run("status", "--cells", "plant")[1]
+    assert "needle abababababab" in out
+    assert "unfinished since 2026-11-30" in out
+    assert document("status", "--cells", "other plant")["cells"] == []
+
+
+@pytest.fixture
+def halted_twice(document, plan):
+    """A plan that two people have halted; its pause before the start is lifted."""
+    for who in ("Li", "Chen"):
+        document("halt", plan, "--operator", who, "--reason", f"{who} looks")
+    return plan
+
+
+def standing(plan):
+    with FleetStore(default_plant()) as store:
+        return [one.number for one in store.progress(plan).standing]
+
+
+def test_of_several_halts_only_those_that_were_seen_are_lifted(run, document, halted_twice):
+    first, second = standing(halted_twice)
+    code, out, err = run("resume", halted_twice, "--reason", "all is well")
+    assert code == 2
+    assert f"halt {first}: " in err
+    assert "Li looks" in err
+    assert f"--halt {second}" in err
+    assert f"halt {second}: " in run("status", halted_twice)[1]
+    code, _, err = run("resume", halted_twice, "--reason", "r", "--halt", "99")
+    assert (code, "no halt 99" in err) == (2, True)
+    assert standing(halted_twice) == [first, second]
+    said = document("resume", halted_twice, "--reason", "Li has looked", "--halt", str(first))
+    assert [one["number"] for one in said["lifted"]] == [first]
+    assert [one["number"] for one in said["halts"]] == [second]
+    code, out, _ = run("resume", halted_twice, "--reason", "Chen has looked")
+    assert (code, f"Plan {halted_twice} goes on." in out) == (0, True)
+    assert standing(halted_twice) == []
+
+
+@pytest.mark.parametrize(("answer", "code"), [("n\n", 9), ("y\n", 0)])
+def test_a_halt_that_comes_while_somebody_reads_the_others_stays(
+    run, halted_twice, monkeypatch, answer, code
+):
+    def answered(_operator, _question, _answer):
+        with FleetStore(default_plant()) as store:
+            store.halt(halted_twice, "Wu", "smoke")
+        return answer == "y\n"
+
+    monkeypatch.setattr("robolink.runner.ask_yes_no", answered)
+    before = standing(halted_twice)
+    with person_at(Person.TERMINAL):
+        found, out, err = run("resume", halted_twice, "--reason", "all is well")
+    assert found == code
+    assert "Li looks" in err
+    assert "Chen looks" in err
+    *others, late = standing(halted_twice)
+    assert others == ([] if code == 0 else before)
+    assert late > before[-1]
+    assert ("is halted still" in out, "smoke" in out) == (code == 0, code == 0)
+
+
+def test_an_agent_without_a_plant_is_that_of_the_plant_called_plant(run, monkeypatch):
+    asked = []
+
+    def refused(plant, _backups):
+        asked.append(plant)
+        raise PlanError("not here")
+
+    monkeypatch.setattr("robolink_cli.commands.fleet.agent.agent_here", refused)
+    assert run("agent")[0] == run("agent", "other")[0] == 2
+    assert asked == ["plant", "other"]

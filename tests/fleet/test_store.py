@@ -1,12 +1,15 @@
 """The store of a plant on both databases: the gate, the outcomes, the halts, the permits."""
 
+import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from robolink.fleet import (
+    FleetStore,
     HaltRule,
     JobOutcome,
     JobState,
@@ -15,7 +18,10 @@ from robolink.fleet import (
     PlantError,
     WaitReason,
 )
+from robolink.fleet.store import statements
+from tests.contract.journal._postgresql import asked
 from tests.fleet._plans import carried_out, cells_of, permitted, plan_with, usual
+from tests.fleet.conftest import Wall
 
 UNSETTLED = JobOutcome(6, "OutcomeUnknownError", what="no answer")
 OFF = JobOutcome(3, "ConnectError", what="no route")
@@ -520,3 +526,108 @@ def test_many_that_open_a_new_database_at_once_make_it_once(open_store):
         list(pool.map(lambda store: store.add_plan(plan), stores))
     assert len(stores[0].plans()) == 1
     assert len(stores[0].progress(plan.id).jobs) == 6
+
+
+def test_a_job_that_the_closed_window_interrupts_waits_for_the_next_one(store, wall):
+    plan = permitted(store, plan_with(kind="check", window="22:00-05:00"))
+    assert store.begin(plan.id, FIRST).begun
+    wall.go_on(hours=7)
+    turn = store.begin(plan.id, FIRST)
+    assert turn.begun
+    assert not turn.may_write
+    held_back = JobOutcome(5, "BusyError", what="The plan may not begin anything now.")
+    store.record_outcome(plan.id, FIRST, turn.job.attempt, held_back)
+    assert why(store, plan, SECOND) is WaitReason.WINDOW
+    assert store.end_vain(plan.id).jobs[0].state is JobState.WAITING
+    wall.go_on(hours=17)
+    assert store.begin(plan.id, FIRST).begun
+    store.record_outcome(plan.id, FIRST, 2, BUSY)  # somebody else had the cell all the time
+    wall.go_on(hours=7)
+    assert store.end_vain(plan.id).jobs[0].state is JobState.MISSED
+
+
+@pytest.mark.soak
+def test_a_home_that_is_frozen_in_a_transaction_holds_up_the_others_for_seconds(server):
+    url = server.empty_database()
+    with FleetStore(url) as store:
+        stuck, other = plan_with(name="stuck"), plan_with(name="other")
+        for plan in (stuck, other):
+            store.add_plan(plan)
+        with store._database.transaction() as database:  # a computer that is cut off ends as soon
+            names = ("keepalives_idle", "keepalives_interval", "keepalives_count", "user_timeout")
+            shown = [database.rows(f"SHOW tcp_{name}")[0][0] for name in names]
+            assert shown == ["5", "2", "3", "10000"]
+        command = [sys.executable, "-c", FROZEN, url, stuck.id]
+        with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            process.send_signal(signal.SIGSTOP)
+            begun, tried = time.monotonic(), 0
+            try:
+                while not halted(url, other):
+                    tried += 1
+                    assert time.monotonic() - begun < 20
+            finally:
+                process.kill()
+        assert tried, "the lock was held at first"
+        assert store.progress(other.id).standing
+
+
+FROZEN = """
+import sys, time
+from robolink.fleet import FleetStore
+from robolink.fleet.store import statements
+with FleetStore(sys.argv[1]) as store, store._database.transaction() as database:
+    store._course(database, sys.argv[2])
+    database.run(statements.NEXT_EVENT)
+    print(flush=True)
+    time.sleep(60)
+"""
+
+
+def halted(url, plan):
+    try:
+        with FleetStore(url) as store:
+            return store.halt(plan.id, "Li")
+    except PlantError:
+        return None
+
+
+@pytest.mark.soak
+def test_who_begins_takes_the_cell_before_the_events_as_who_ends(server):
+    """Else two plans at one cell wait for each other, and the server undoes one of them."""
+    url, wall = server.empty_database(), Wall()
+    night = plan_with(kind="check", window="22:00-05:00")
+    day = plan_with(kind="backup", name="day")
+    with FleetStore(url, clock=wall) as store:
+        for plan in (night, day):
+            store.add_plan(plan)
+        carried_out(store, night, SECOND, OFF)
+        assert store.begin(day.id, FIRST).begun
+        wall.go_on(hours=7)  # so that the next begin of the night ends a job
+
+        def waiting():
+            query = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'"
+            return asked(url, query)[0][0]
+
+        def waits_for(count):
+            deadline = time.monotonic() + 5
+            while waiting() != count:
+                assert time.monotonic() < deadline
+
+        def elsewhere(act):
+            with FleetStore(url, clock=wall) as other:
+                return act(other)
+
+        with ThreadPoolExecutor(2) as pool:
+            with store._database.transaction() as database:
+                database.run(statements.NEXT_EVENT)
+                begins = pool.submit(elsewhere, lambda one: one.begin(night.id, FIRST))
+                waits_for(1)
+                ends = pool.submit(
+                    elsewhere, lambda one: one.record_outcome(day.id, FIRST, 1, JobOutcome(0))
+                )
+                waits_for(2)
+            assert begins.result().why is WaitReason.WINDOW
+            assert ends.result().job.state is JobState.KEPT
+        assert state_of(store, night, SECOND) is JobState.MISSED

@@ -59,7 +59,7 @@ def test_each_package_that_the_sources_import_is_a_dependency_or_an_extra():
     wanted = {requirement.name.replace("-", "_") for requirement in run_time_dependencies()}
     # Each release of pydantic requires one version of pydantic_core.
     packages = {"can": "python_can", "serial": "pyserial", "pydantic_core": "pydantic"}
-    packages |= {"PIL": "pillow", "cv2": "opencv_python_headless"}
+    packages |= {"PIL": "pillow", "cv2": "opencv_python_headless", "paho": "paho_mqtt"}
     ours = {"robolink", "robolink_cli", "robolink_simulators", "pytest", "_typeshed"}
     # A clone compiles its catalogues with it; an installation has them compiled.
     ours.add("babel")

@@ -46,6 +46,7 @@ NOT_DATA = {
     "robolink.calibration_run.ToolPlan": "a source, which measures",
     "robolink.controllers.ConnectionTerms": "a password, a clock",
     "robolink.controllers.SimpleMachine": "it changes",
+    "robolink.journal.JournalCopy": "an error",
     "robolink.journal.JournalMove": "errors",
     "robolink.model.Account": "it changes",
     "robolink.stations.BeamStation": "its beams are looked up by the type checker alone",

@@ -17,13 +17,18 @@ NEVER: Final = ("dev", "browser", "docs")
 PYTHONS: Final = ("3.11", "3.12", "3.13", "3.14")
 """The versions of Python that ``make versions`` looks for, the lowest first."""
 
+_OF_A_PLANT: Final = ("paho-mqtt", "prometheus-client")
+
 UNTRIED: Final = {
+    "newest-3.12": frozenset(_OF_A_PLANT),
+    "newest-3.13": frozenset(_OF_A_PLANT),
     "newest-3.14": frozenset(
         {
+            *_OF_A_PLANT,
             *("cryptography", "starlette", "uvicorn", "websockets"),
             *("opencv-python-headless", "pillow", "dbos", "sqlalchemy"),
         }
-    )
+    ),
 }
 """Packages that a run has not had yet: they came after it, and the machine had no such Python.
 """

@@ -8,7 +8,7 @@ from typing import Any
 import click
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.measure import recalibration
+from robolink_cli.commands.measure import run_events
 from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
 from robolink_cli.commands.measure.recipe_choice import choose_recipe
 from robolink_cli.options.shared import GIVEN, TYPED
@@ -518,9 +518,9 @@ def test_a_screen_is_not_headed_twice_and_says_which_of_several_tools(
 ):
     told: list[str] = []
     nothing = click.Context(click.Command("x"))
-    monkeypatch.setattr(recalibration, "drawn_elsewhere", lambda: drawn)
-    monkeypatch.setattr(recalibration, "note", told.append)
-    progress = recalibration.Progress(recalibration.EventStream(nothing, on=False), tools)
+    monkeypatch.setattr(run_events, "drawn_elsewhere", lambda: drawn)
+    monkeypatch.setattr(run_events, "note", told.append)
+    progress = run_events.Progress(run_events.EventStream(nothing, on=False), tools)
     bench: Any = None
     progress.moment(Moment.BEFORE_MEASURE, bench, 2)
     progress.moment(Moment.BEFORE_WRITE, bench)

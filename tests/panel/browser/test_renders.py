@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from robolink_cli.panel.pages import Pages, Watcher
 
-from tests.panel.browser import samples
+from tests.panel.browser import plan_samples, samples
 from tests.panel.browser.conftest import SIZES
 from tests.panel.browser.person import pictured
 from tests.panel.browser.scripted import OPERATOR
 
 pytestmark = pytest.mark.timeout(240)
 
-PAGES = ("idle", "busy", "overview", "history", "login", "pairing")
+PAGES = ("idle", "busy", "overview", "history", "login", "pairing", *plan_samples.LONG)
 
 LEAST = {"1280": 86, "1024": 67}
 """Smallest side of what is pressed, in px: 15 mm on a tablet of 10.1 inch, less the frame."""
@@ -69,6 +69,7 @@ def documents(language, dark):
         "/pairing": pages.page(
             "pairing", Watcher(language, dark, paired=False), names=("Meier",)
         ),
+        **plan_samples.documents(pages, replace(watcher, role="engineer")),
     }  # fmt: skip
 
 
@@ -99,7 +100,7 @@ def test_nothing_is_cut_small_or_over_stop(panel, screen):
     panel.beats_only = True  # what is measured are these pages, not the view that follows
     for name in PAGES:
         page.goto(panel.url.replace("/cell/line3", f"/{name}"))
-        if name == "history":
+        if name in ("history", *plan_samples.LONG):
             page.evaluate("document.getElementById('main').dataset.long = ''")
         faults[name] = look(page, size)
         page.evaluate("document.body.classList.remove('silent')")

@@ -149,7 +149,7 @@ def test_a_damaged_picture_leaves_the_page_as_it_is(hub):
 
 def answer(hub, cell="line3", **query):
     nobody: Any = SimpleNamespace(seats=None, audit=SimpleNamespace(note=None))
-    panel = Panel(hub, nobody, nobody, nobody)
+    panel = Panel(hub, nobody, nobody, nobody, looking=nobody, ordering=nobody)
     request: Any = SimpleNamespace(path_params={"cell": cell}, query_params=query)
     return asyncio.run(panel._picture(request))
 

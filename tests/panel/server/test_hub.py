@@ -53,7 +53,7 @@ class FewPages(Pages):
         self.drawn += 1
         return Parts("idle", card.name, card.word, watcher.language)
 
-    def overview(self, cards, watcher):
+    def overview(self, cards, watcher, bar=None):
         self.drawn += 1
         return Parts("overview", "", " ".join(card.word for card in cards), watcher.language)
 
@@ -291,7 +291,8 @@ def test_a_tablet_that_is_heard_keeps_its_seat_however_long_a_job_takes(hub):
     access = SimpleNamespace(seats=seats, audit=SimpleNamespace(note=None))
     parts: Any = (hub, None, access, None)
     line: Any = Line()
-    asyncio.run(Panel(*parts)._listen(line, Tablet().live))
+    desk: Any = None
+    asyncio.run(Panel(*parts, looking=desk, ordering=desk)._listen(line, Tablet().live))
     assert seats.holder("line3", moving=False) is not None
     clock.sleep(SILENCE_S * 1.1)
     assert seats.holder("line3", moving=False) is None
@@ -502,18 +503,18 @@ def test_each_recipe_is_offered_and_only_an_offered_one_is_taken(hub):
     assert only.details == ("recipe: needle", "needle told")
     board.recipes = (recipe("needle"), recipe("two"))
     assert [dict(one.values) for one in offers()] == [{"recipe": "needle"}, {"recipe": "two"}]
-    assert board.recipe(kind, {"recipe": "two"}) == "/cells/two.toml"
+    assert board.subject(kind, {"recipe": "two"}) == "/cells/two.toml"
     for wrong in (None, "two", {}, {"recipe": "/etc/passwd"}, {"recipe": ["two"]}):
-        assert board.recipe(kind, wrong) == ""
-    assert board.recipe(KINDS["undo"], {"recipe": "two"}) == ""
+        assert board.subject(kind, wrong) == ""
+    assert board.subject(KINDS["undo"], {"recipe": "two"}) == ""
     board.recipes = (recipe("needle"), recipe("needle"))
     assert [dict(one.values) for one in offers()] == [{}], "a name that two share chooses neither"
-    assert board.recipe(kind, {"recipe": "needle"}) == ""
+    assert board.subject(kind, {"recipe": "needle"}) == ""
 
 
 def test_a_job_with_a_recipe_names_its_file_and_nothing_that_is_an_option():
     one = PanelJob(
-        "line3", KINDS["change"], language="en", who="", changed=lambda: None, recipe="-x.toml"
+        "line3", KINDS["change"], language="en", who="", changed=lambda: None, subject="-x.toml"
     )
     assert one.arguments == ["-c", "line3", "change", "--", "-x.toml"]
 

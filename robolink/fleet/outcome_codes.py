@@ -86,6 +86,7 @@ BY_ERROR: Final = {
     "NotComparedError": _P,
     "NotNowError": _P,
     "NotReadyError": _P,
+    "OpenLineJobsError": _H,
     "OutcomeUnknownError": Treatment.UNSETTLED,
     "PlanError": _H,
     "PlantError": _H,

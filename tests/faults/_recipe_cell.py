@@ -163,10 +163,19 @@ class RecipeCell(ABC):
             assert self.switched.get(number) is on or doubtful, (named, self.switched, said)
         for number, on in self.switched.items():
             known = named.get(number) is on or self.sent_as(number, on) in unproved
+            known = known or self._told_as_carried_out(words, number) is on
             assert known or on is self.outputs_before[number], (number, on, said)
         by_itself = self.outputs() != {**self.outputs_before, **self.switched}
         if early and by_itself and (self.switched or self.moves_asked()):
             assert _BY_THE_STOP in words, said
+
+    def _told_as_carried_out(self, words: str, number: int) -> bool | None:
+        """Return the last state of an output in the list of requests that stands at such an end."""
+        _, _, told = words.rpartition("This was carried out: ")
+        # A request may be the beginning of the other one, so the longer match goes first.
+        last_on = told.rfind(self.sent_as(number, True))
+        last_off = told.rfind(self.sent_as(number, False))
+        return None if max(last_on, last_off) < 0 else last_on >= last_off
 
     def check_motion_is_allowed(self) -> None:
         """A movement starts again when it is requested."""

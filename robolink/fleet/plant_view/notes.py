@@ -152,6 +152,14 @@ class PlantNotes:
 
         Returns:
             Both; ``None`` for cells that were not asked about.
+
+        Example:
+            >>> from robolink.fleet import CellState, PlantNotes
+            >>> with PlantNotes("counted-example.db", "plant") as notes:
+            ...     _ = notes.note({"a": CellState("epson-1", "home")}, {"journal": ("1f", 7)})
+            ...     at, cells = notes.counted("journal", ["a", "b"], unless=None)
+            >>> at, list(cells)
+            (('1f', 7), ['a'])
         """
         with self._database.transaction() as database:
             found = self._position(database, position)
@@ -180,6 +188,16 @@ class PlantNotes:
 
         Returns:
             Whether they were noted: nothing is, once another process has moved such a position.
+
+        Example:
+            >>> from robolink.fleet import CellState, PlantNotes
+            >>> states, first, then = {"a": CellState("epson-1", "home")}, ("1f", 7), ("1f", 8)
+            >>> with PlantNotes("note-example.db", "plant") as notes:
+            ...     _ = notes.note(states, {"journal": first})
+            ...     ok = notes.note(states, {"journal": then}, after={"journal": first})
+            ...     late = notes.note(states, {"journal": then}, after={"journal": first})
+            >>> ok, late
+            (True, False)
         """
         at = label_of(self._clock())
         rows = [

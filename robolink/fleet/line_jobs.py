@@ -18,7 +18,6 @@ from robolink.files.toml import Problem
 from robolink.fleet.errors import PlanError
 from robolink.fleet.plans import SCHEMA, Plan, plan_of
 from robolink.fleet.states import PlanKind
-from robolink.fleet.windows import Window
 from robolink.messages import known_names, listed, tr
 from robolink.transaction import require_order_id
 
@@ -208,7 +207,7 @@ def line_order_table() -> "type[BaseModel]":
     """Return the keys and limits of a body. pydantic is imported with the first one."""
     from pydantic import BaseModel, Field, field_validator
 
-    from robolink.fleet.plan_tables import STRICT, Line, OffsetTable
+    from robolink.fleet.plan_tables import STRICT, Hours, Line, OffsetTable
 
     class LineOrderTable(BaseModel):
         """What a line computer posts.
@@ -231,7 +230,7 @@ def line_order_table() -> "type[BaseModel]":
         kind: Annotated[PlanKind, Field(strict=False)]
         recipe: Line | None = None
         offset: OffsetTable | None = None
-        window: str = ""
+        window: Hours = ""
         permit: Annotated[str, Field(max_length=200)] = ""
 
         @field_validator("order")
@@ -241,16 +240,6 @@ def line_order_table() -> "type[BaseModel]":
                 return require_order_id(order)
             except ConfigError:
                 raise ValueError(tr("must be 1 to 64 printable ASCII characters")) from None
-
-        @field_validator("window")
-        @classmethod
-        def _is_a_window(cls, window: str) -> str:
-            if window:
-                try:
-                    Window.parse(window)
-                except ValueError:
-                    raise ValueError(tr("must be two times of day: 22:00-05:00")) from None
-            return window
 
     return LineOrderTable
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from robolink.fleet.states import PlanKind
 from robolink.fleet.windows import Window
@@ -11,6 +11,19 @@ from robolink.model import COMPONENTS
 
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 """One line for people. No control characters: they would reach a terminal."""
+
+
+def _hours(window: str) -> str:
+    if window:
+        try:
+            Window.parse(window)
+        except ValueError:
+            raise ValueError(tr("must be two times of day: 22:00-05:00")) from None
+    return window
+
+
+Hours = Annotated[str, AfterValidator(_hours)]
+"""Two times of day, ``22:00-05:00``; empty for any hour."""
 
 STRICT = ConfigDict(
     extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True
@@ -75,18 +88,8 @@ class PlanFile(BaseModel):
     plant: Line = "plant"
     recipe: Line | None = None
     offsets: dict[Line, OffsetTable] = Field(default_factory=dict)
-    window: str = ""
+    window: Hours = ""
     permit: str = ""
     at_once: Annotated[int, Field(ge=1, le=1000)] = 20
     auto: bool = False
     expected_refusals: Annotated[float, Field(ge=0.001, le=0.5)] = 0.03
-
-    @field_validator("window")
-    @classmethod
-    def _is_a_window(cls, window: str) -> str:
-        if window:
-            try:
-                Window.parse(window)
-            except ValueError:
-                raise ValueError(tr("must be two times of day: 22:00-05:00")) from None
-        return window

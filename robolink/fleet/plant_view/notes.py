@@ -18,6 +18,7 @@ from robolink.fleet.store import statements
 from robolink.fleet.store.course import PlanCourse
 from robolink.fleet.store.database import FleetDatabase
 from robolink.fleet.store.rows import label_of, read_halt, read_plan
+from robolink.interrupts import ClosedAtExit
 from robolink.journal.store.chain import canonical
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.timing import wall_time
@@ -87,7 +88,7 @@ class PlantLook:
     unnoted: tuple[str, ...] = ()
 
 
-class PlantNotes:
+class PlantNotes(ClosedAtExit):
     """Reads and adds notes in a plant's database.
 
     Args:
@@ -111,12 +112,6 @@ class PlantNotes:
     ) -> None:
         self._database = FleetDatabase(location)
         self._plant, self._clock = plant, clock
-
-    def __enter__(self) -> "PlantNotes":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     @property
     def name(self) -> str:

@@ -8,7 +8,6 @@ each other's outcomes: a rule is checked in the transaction of the outcome that 
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
-from typing import Self
 
 from robolink.fleet.outcome_codes import Treatment, treatment_of
 from robolink.fleet.plans import Plan
@@ -40,12 +39,13 @@ from robolink.fleet.store.rows import (
     read_plan,
     unknown_plan,
 )
+from robolink.interrupts import ClosedAtExit
 from robolink.journal import this_computer
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.timing import wall_time
 
 
-class FleetStore:
+class FleetStore(ClosedAtExit):
     """Keeps plans and their outcomes in a file or on a server.
 
     One connection is kept and given to one thread at a time; after any error it is dropped, and
@@ -95,12 +95,6 @@ class FleetStore:
     def made(self) -> bool:
         """Whether it may hold anything: files are looked for, servers are not."""
         return self._database.made
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the connection; the next call makes a new one."""

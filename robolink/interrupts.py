@@ -339,7 +339,10 @@ class _SeenThrough(InterruptGate):
     """A gate that is open for one block."""
 
     def __enter__(self) -> None:
-        self.open()
+        if _handler.depth and _handler.heard_here():
+            self._open = True  # the gate around this one watches already
+        else:
+            self.open()
         try:
             super().__enter__()
         except BaseException:  # Ctrl-C came before the block had begun

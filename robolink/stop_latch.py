@@ -14,8 +14,9 @@ How long a call waits for another thread, program or person stands here too: a s
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from enum import Enum, auto
+from types import TracebackType
 from typing import Final, TypeVar
 
 from robolink import runtime
@@ -208,32 +209,22 @@ class StopLatch:
         if self._closings != since:
             raise self._stopped(tr("{request}: ended by a stop.", request=request), request)
 
-    @contextmanager
-    def watching(self, request: str) -> Iterator[None]:
+    def watching(self, request: str) -> AbstractContextManager[None]:
         """Surround an operation that must not start under a stop, nor end well under one.
 
         Raises:
             StoppedError: A stop was active at its beginning, or came meanwhile.
         """
-        self.require_open(request)
-        with self.ending(request):
-            yield
+        return _Watching(self, self._controller, request)
 
-    @contextmanager
-    def ending(self, request: str) -> Iterator[None]:
+    def ending(self, request: str) -> AbstractContextManager[None]:
         """Surround what must not end well under a stop.
 
         Raises:
             StoppedError: A stop is active at its end, be that a success or a "no" of the
                 controller, which the stop explains.
         """
-        with Concerning(self._controller, request):
-            try:
-                yield
-            except (ControllerError, UnclearAnswerError):
-                self.require_open(request)
-                raise
-            self.require_open(request)
+        return _Ending(self, self._controller, request)
 
     @contextmanager
     def calming(self, request: str) -> Iterator[None]:
@@ -297,6 +288,35 @@ class StopLatch:
         return StoppedError(said, remedy=remedy, controller=self._controller, request=request)
 
 
+class _Ending(Concerning):
+    """See :meth:`StopLatch.ending`. No generator: every movement and every write passes here."""
+
+    __slots__ = ("_latch",)
+
+    def __init__(self, latch: StopLatch, controller: str, request: str) -> None:
+        super().__init__(controller, request)
+        self._latch = latch
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is None or isinstance(error, (ControllerError, UnclearAnswerError)):
+            self._latch.require_open(self._request)
+        super().__exit__(kind, error, trace)
+
+
+class _Watching(_Ending):
+    """See :meth:`StopLatch.watching`."""
+
+    __slots__ = ()
+
+    def __enter__(self) -> None:
+        self._latch.require_open(self._request)
+
+
 LONGEST_WAIT_S: Final = 86_400.0
 """Longest wait for a turn, in s: a day."""
 
@@ -322,6 +342,31 @@ def require_wait(wait_s: float) -> float:
             ),
         )
     return float(wait_s)
+
+
+class _Calling:
+    """The state of a thread's call for a block. No generator: every call to a driver passes here.
+
+    Args:
+        calls: Has the state of each thread.
+        state: That of the call.
+    """
+
+    __slots__ = ("_before", "_calls", "_state")
+
+    def __init__(self, calls: threading.local, state: dict[str, int | None]) -> None:
+        self._calls, self._state = calls, state
+
+    def __enter__(self) -> None:
+        call = self._calls.__dict__
+        self._before = dict(call)
+        call.clear()
+        call.update(self._state)
+
+    def __exit__(self, *_: object) -> None:
+        call = self._calls.__dict__
+        call.clear()
+        call.update(self._before)
 
 
 class Patience:
@@ -372,8 +417,7 @@ class Patience:
         until_ns: int | None = self._calls.__dict__.get("until_ns")
         return 0.0 if until_ns is None else max(0, until_ns - runtime.monotonic_ns()) / 1e9
 
-    @contextmanager
-    def within(self, wait_s: float | None = None) -> Iterator[None]:
+    def within(self, wait_s: float | None = None) -> AbstractContextManager[None]:
         """Surround one call; the calls inside it wait within the same seconds.
 
         Args:
@@ -382,30 +426,15 @@ class Patience:
         Raises:
             ConfigError: That is no wait.
         """
-        call = self._calls.__dict__
-        if wait_s is None and "until_ns" in call:
-            yield
-            return
+        if wait_s is None and "until_ns" in self._calls.__dict__:
+            return nullcontext()
         seconds = self._wait_s if wait_s is None else require_wait(wait_s)
         until_ns = runtime.monotonic_ns() + int(seconds * 1e9) if seconds else None
-        with self._calling({"until_ns": until_ns}):
-            yield
+        return _Calling(self._calls, {"until_ns": until_ns})
 
     def between(self) -> AbstractContextManager[None]:
         """Surround a user's code inside a block: each call there waits by itself."""
-        return self._calling({})
-
-    @contextmanager
-    def _calling(self, state: dict[str, int | None]) -> Iterator[None]:
-        call = self._calls.__dict__
-        before = dict(call)
-        call.clear()
-        call.update(state)
-        try:
-            yield
-        finally:
-            call.clear()
-            call.update(before)
+        return _Calling(self._calls, {})
 
     def watch(self, request: str, *, calming: bool = False) -> Callable[[], None]:
         """Start to wait; the returned function raises once a stop, or Ctrl-C, came.

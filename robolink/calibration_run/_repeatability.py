@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Final, Literal
 
 from robolink.calibration import (
@@ -72,7 +73,7 @@ def seating_of(controller: Controller) -> Seating:
     measured; a Z that was kept would look like a nozzle that always sits alike.
     """
     entries = controller.outcomes.recorded(kinds=(EntryKind.DONE, EntryKind.DECISION))
-    changes = list(_changes(entries))[:MOST_CHANGES]
+    changes = list(islice(_changes(entries), MOST_CHANGES))
     if len(changes) < LEAST_CHANGES:
         return Seating()
     plane = math.sqrt(sum(dx * dx + dy * dy for dx, dy, _ in changes) / (2 * len(changes)))

@@ -402,7 +402,7 @@ def _entry(row: Mapping[str, Any]) -> Recorded:
         # A kind that only a newer robolink knows stays a text.
         kind=_KINDS.get(row["kind"], cast("EntryKind", row["kind"])),
         details=_details(row["details"]),
-        signature=Signature(**{field.name: row[field.name] for field in fields(Signature)}),
+        signature=Signature(**{name: row[name] for name in _SIGNED}),
     )
 
 
@@ -411,7 +411,7 @@ def _check(row: Mapping[str, Any]) -> RecordedCheck:
         **{name: row[name] for name in ("number", "at", "controller", "cell", "verdict", "hash")},
         well=bool(row["well"]),
         details=_details(row["details"]),
-        signature=Signature(**{field.name: row[field.name] for field in fields(Signature)}),
+        signature=Signature(**{name: row[name] for name in _SIGNED}),
     )
 
 
@@ -426,4 +426,5 @@ def _details(text: str | None) -> Mapping[str, object]:
 _PLAIN: Final = tuple(
     field.name for field in fields(Recorded) if field.name not in ("kind", "details", "signature")
 )
+_SIGNED: Final = tuple(field.name for field in fields(Signature))
 _KINDS: Final = {str(kind): kind for kind in EntryKind}

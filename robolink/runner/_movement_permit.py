@@ -4,8 +4,8 @@ A key switch that a cell names, a person at a page who may have gone: whoever kn
 puts it up for a block, and every movement of a runner on that controller passes it, by hand or not.
 """
 
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from typing import Protocol
 
 from robolink.model import Controller
@@ -57,10 +57,15 @@ def permitted_by(controller: Controller, permit: MovementPermit) -> Iterator[Non
             _permits.pop(id(controller), None)
 
 
+def movement_permit(controller: Controller, *, by_hand: bool) -> AbstractContextManager[object]:
+    """Return a block with every permit of a controller, for one movement."""
+    permits = tuple(_permits.get(id(controller), ()))
+    return _all_given(permits, by_hand=by_hand) if permits else nullcontext()
+
+
 @contextmanager
-def movement_permit(controller: Controller, *, by_hand: bool) -> Iterator[None]:
-    """Enter every permit of a controller, for one movement."""
+def _all_given(permits: Iterable[MovementPermit], *, by_hand: bool) -> Iterator[None]:
     with ExitStack() as stack:
-        for permit in tuple(_permits.get(id(controller), ())):
+        for permit in permits:
             stack.enter_context(permit(by_hand=by_hand))
         yield

@@ -310,7 +310,21 @@ def test_older_firmware_prints_its_robot_and_hides_the_rest(serve, options):
 
 
 @pytest.mark.remote_ethernet
-def test_facts_of_two_robots_are_read_and_a_strange_answer_is_left_out(simulator, connected):
+def test_facts_that_only_a_restart_changes_are_asked_once_in_a_session(simulator, connected):
+    first, before = connected.facts(), len(asked(simulator))
+    assert connected.facts() == first
+    assert asked(simulator)[before:] == ["$GetCurRobot", "$GetPrjName"]
+
+
+@pytest.mark.remote_ethernet
+def test_a_strange_answer_about_the_robots_is_left_out(simulator, connected):
+    simulator._desk._served["getrobotserial"] = lambda robot: ("2", "A1")
+    simulator.panel.set_monitoring_only(True)
+    assert connected.facts().robot_serials == ()
+
+
+@pytest.mark.remote_ethernet
+def test_facts_of_two_robots_are_read(simulator, connected):
     simulator._desk._served["getrobotinfo"] = lambda: ("2", "3", "T6-602S", "5", "C8-C901S")
     simulator._desk._served["getrobotserial"] = lambda robot: ("2", "A1", " B2 ")
     simulator._desk._served["getcontname"] = lambda: ("0",)
@@ -319,6 +333,3 @@ def test_facts_of_two_robots_are_read_and_a_strange_answer_is_left_out(simulator
     assert facts.robot_models == ("T6-602S", "C8-C901S")
     assert facts.robot_serials == ("A1", "B2")
     assert (facts.controller_name, facts.firmware) == (None, "7.5.1")
-    simulator._desk._served["getrobotserial"] = lambda robot: ("2", "A1")
-    simulator.panel.set_monitoring_only(True)
-    assert connected.facts().robot_serials == ()

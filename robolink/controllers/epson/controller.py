@@ -8,7 +8,7 @@ from robolink.controllers.epson.answers import NOT_EXECUTED, may_log_out, requir
 from robolink.controllers.epson.condition import ConditionReader, EpsonAlarms
 from robolink.controllers.epson.group import EpsonGroup
 from robolink.controllers.epson.line import EpsonLine, open_line
-from robolink.controllers.epson.link import EpsonLink, FactReader
+from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.preserve import EpsonPreserver, EpsonResolver, PendingValues
 from robolink.controllers.epson.session import (
     EpsonSession,
@@ -201,7 +201,7 @@ class EpsonController(ControllerCore):
 
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are; allowed while production runs."""
-        return FactReader(self._link.session, self._link.window).read()
+        return self._link.facts.read()
 
     def error_text(self, code: int) -> str:
         """Return the controller's own text for an error number, empty where it has none."""

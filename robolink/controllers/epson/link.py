@@ -277,17 +277,28 @@ class _BusyNow(Exception):
     """The controller cannot answer just now."""
 
 
+_FIXED: Final = frozenset(
+    {
+        *("GetRobotInfo", "GetRobotSerial"),
+        *("GetContVer", "GetContName", "GetContType", "GetContNo"),
+    }
+)
+"""Queries whose answer only a restart of the controller can change, which ends the session."""
+
+
 class FactReader:
     """Reads :class:`robolink.model.ControllerFacts`.
 
     The queries of docs/reference/epson.md 1.8 change nothing and are served while production runs
     and to a client that may only monitor. Older firmware refuses them; there the robot's model and
-    serial number are printed through Execute, if Execute is available just then.
+    serial number are printed through Execute, if Execute is available just then. What stays the
+    same in a session is asked once.
     """
 
     def __init__(self, session: EpsonSession, window: CommandWindow) -> None:
         self._session = session
         self._window = window
+        self._answers: dict[str, tuple[str, ...]] = {}
 
     def read(self) -> ControllerFacts:
         """Return what can be read now."""
@@ -323,12 +334,17 @@ class FactReader:
         return models[robot - 1] if 1 <= robot <= len(models) else None
 
     def _fields(self, name: str, *parameters: str) -> tuple[str, ...] | None:
+        if name in self._answers:
+            return self._answers[name]
         try:
-            return self._session.exchange(name, *parameters).fields
+            fields = self._session.exchange(name, *parameters).fields
         except RejectedError as error:
             if error.code in NOT_EXECUTED:
                 return None
             raise
+        if name in _FIXED:
+            self._answers[name] = fields
+        return fields
 
     def _text(self, name: str) -> str | None:
         fields = self._fields(name)
@@ -368,6 +384,7 @@ class EpsonLink(DriverLink):
         window: Statements, as if typed in the controller's command window.
         preferences: What is set in the controller.
         robot: Which robot statements act on.
+        facts: Reads which controller and robots these are.
 
     Args:
         session: A session that has logged in.
@@ -379,6 +396,7 @@ class EpsonLink(DriverLink):
         self.window = CommandWindow(session)
         self.preferences = Preferences(session)
         self.robot = RobotFacts(self.window)
+        self.facts = FactReader(session, self.window)
         self._reader = IdentityReader(session, self.window)
         outcomes.ask(self._reader.read)
         super().__init__(
@@ -392,7 +410,7 @@ class EpsonLink(DriverLink):
 
     def model(self) -> str | None:
         """Read the model of the current robot, ``None`` if the controller does not tell it."""
-        return FactReader(self.session, self.window).model(self.robot.read().number)
+        return self.facts.model(self.robot.read().number)
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
         """Whether a refusal confirms that nothing was done (docs/reference/epson.md 1.6)."""

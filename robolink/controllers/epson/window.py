@@ -1,8 +1,8 @@
 """Statements run through Execute, as if typed in the controller's command window."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from functools import lru_cache
+from types import TracebackType
 
 from robolink.controllers.epson.answers import (
     NOT_EXECUTED,
@@ -84,8 +84,7 @@ class CommandWindow:
             ),
         )
 
-    @contextmanager
-    def proving_ready(self, request: str) -> Iterator[None]:
+    def proving_ready(self, request: str) -> AbstractContextManager[None]:
         """Refuse ``request`` unless the queries of a block are answered.
 
         Execute needs what :meth:`require_ready` looks for (docs/reference/epson.md 1.2), so an
@@ -97,13 +96,12 @@ class CommandWindow:
         Raises:
             NotReadyError: Names the condition.
         """
-        if not self._was_ready or (self._gap_known and self._gap is None):
-            self.require_ready(request)
-        try:
-            yield
-        except (RejectedError, ControllerFaultError):
-            self.require_ready(request)
-            raise
+        return _ProvingReady(self, request)
+
+    @property
+    def proves_ready(self) -> bool:
+        """Whether an answer proves that the controller is ready, which it was when seen last."""
+        return self._was_ready and not (self._gap_known and self._gap is None)
 
     def command(self, statement: Statement) -> None:
         """Run a statement that prints nothing.
@@ -275,6 +273,33 @@ class CommandWindow:
         except RejectedError:
             return ""
         return ",".join(reply.fields).strip()
+
+
+class _ProvingReady:
+    """See :meth:`CommandWindow.proving_ready`. No generator: every look at the arm is made in one.
+
+    Args:
+        window: Where the queries are made.
+        request: What is refused.
+    """
+
+    __slots__ = ("_request", "_window")
+
+    def __init__(self, window: CommandWindow, request: str) -> None:
+        self._window, self._request = window, request
+
+    def __enter__(self) -> None:
+        if not self._window.proves_ready:
+            self._window.require_ready(self._request)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if isinstance(error, (RejectedError, ControllerFaultError)):
+            self._window.require_ready(self._request)
 
 
 @lru_cache(maxsize=256)

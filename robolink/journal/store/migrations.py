@@ -3,12 +3,15 @@
 A migration that was once released never changes; what comes later is a migration of its own.
 """
 
+import threading
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Final
 
 from robolink.errors import JournalError
+from robolink.journal._places import memory_place
 from robolink.journal.store import statements
-from robolink.journal.store.connection import DatabaseConnection
+from robolink.journal.store.connection import DatabaseConnection, backend_of
 from robolink.messages import tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
@@ -168,6 +171,29 @@ def migrate(connection: DatabaseConnection, found: int) -> None:
     for step in MIGRATIONS[found:]:
         step(connection)
     connection.run(statements.SET_VERSION, {"own": len(MIGRATIONS)})
+
+
+def copy_new(connection: DatabaseConnection) -> None:
+    """Give an empty database in memory, which nobody else can reach, the tables of a new journal.
+
+    A process may have thousands of them, and tables are copied in a hundredth of the time that it
+    takes to make them.
+    """
+    with _copying:
+        _new(MIGRATIONS).driver.backup(connection.driver)
+
+
+_copying: Final = threading.Lock()
+
+
+@lru_cache(maxsize=1)
+def _new(steps: tuple[Callable[[DatabaseConnection], None], ...]) -> DatabaseConnection:
+    """Return a new journal in memory, made by these steps; nothing is ever added to it."""
+    connection = backend_of(memory_place("new"), read_only=False).connect()
+    for step in steps:
+        step(connection)
+    connection.run(statements.SET_VERSION, {"own": len(steps)})
+    return connection
 
 
 def newer_error(name: str, found: int) -> JournalError:

@@ -378,6 +378,9 @@ class Store:
             return found
         if self._read_only:
             raise migrations.empty_error(name)
+        if not (found or self.durable):
+            migrations.copy_new(connection)
+            return own
         connection.run(connection.begin_migrating)
         # Another process may have been faster while this one waited for the lock.
         found = migrations.stored_version(connection, name)

@@ -34,7 +34,10 @@ class CommandState(IntEnum):
     @property
     def final(self) -> bool:
         """Whether the command has ended."""
-        return self >= CommandState.DONE
+        return self >= _DONE
+
+
+_DONE: Final = CommandState.DONE  # before Python 3.12 a member is found slowly
 
 
 class GroupState(IntEnum):

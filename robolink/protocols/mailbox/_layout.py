@@ -19,6 +19,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum
+from functools import lru_cache
 from itertools import accumulate
 from typing import Any, Final, NamedTuple
 
@@ -41,6 +42,12 @@ _CRC_OF_LOW: Final = tuple(crc >> 8 ^ _CRC_OF_HIGH[crc & 0xFF] for crc in _CRC_O
 
 def crc16(words: Sequence[int]) -> int:
     """Return CRC-16/MODBUS over the bytes of ``words``, the low byte of each first."""
+    return _crc16(tuple(words))
+
+
+@lru_cache(maxsize=64)
+def _crc16(words: tuple[int, ...]) -> int:
+    # A PLC at rest shows the same block again and again, and one in process the one just packed.
     crc = 0xFFFF
     for word in words:
         crc ^= word

@@ -6,6 +6,7 @@ The texts are the controller's own, as GetErrMsg would give them: they travel ov
 and are data there, so they are not translated.
 """
 
+from dataclasses import fields
 from enum import Enum, StrEnum, auto
 from functools import lru_cache
 from typing import Final
@@ -343,22 +344,36 @@ class Condition:
 
     def flags(self, *, executing: bool = False) -> StatusFlags:
         """Return the flags; ``executing`` shows an Execute as a running task."""
+        return self._shared(executing=executing)[0]
+
+    def names_on(self) -> frozenset[str]:
+        """Return the names of the flags that are on while no Execute runs."""
+        return self._shared(executing=False)[1]
+
+    def _shared(self, *, executing: bool) -> tuple[StatusFlags, frozenset[str]]:
+        mode, task = self.mode, self.task
         return _shared_flags(
-            self.mode is Mode.TEST,
-            self.mode is Mode.TEACH,
-            self.mode is Mode.AUTO and not self.monitoring_only,
+            mode is _TEST,
+            mode is _TEACH,
+            mode is _AUTO and not self.monitoring_only,
             self._warning,
             self._serious,
             self.guard_open,
             self._estop_latched,
             self._error,
-            self.task is Task.PAUSED,
-            self.task is Task.RUNNING or executing,
-            self.task is Task.NONE and not executing,
+            task is _PAUSED,
+            task is _RUNNING or executing,
+            task is _NONE and not executing,
         )
 
 
+# Each request asks for all of them, and before Python 3.12 a member of an Enum is found slowly.
+_AUTO, _TEACH, _TEST = Mode
+_NONE, _RUNNING, _PAUSED = Task
+
+
 @lru_cache(maxsize=512)
-def _shared_flags(*in_order: bool) -> StatusFlags:
-    """Return flags in the order of their class; they are asked for in every exchange."""
-    return StatusFlags(*in_order)
+def _shared_flags(*in_order: bool) -> tuple[StatusFlags, frozenset[str]]:
+    """Return flags in the order of their class, and the names of those that are on."""
+    flags = StatusFlags(*in_order)
+    return flags, frozenset(one.name for one in fields(flags) if getattr(flags, one.name))

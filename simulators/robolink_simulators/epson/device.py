@@ -7,6 +7,7 @@ the time, and asks when to call again.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -117,20 +118,8 @@ class EpsonSimulator(SteppedController):
         if state_path is not None or world is not None:
             self._begin()  # refuses a file or world that does not fit
             self._flash.save_changes()  # refuses a file that cannot be written
-
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a controller has
-        """Make the controller at first use.
-
-        A process serves thousands, of which few are ever used; so what stands in :meth:`_make`
-        costs nothing until then. It is what it would be, had it been made at once.
-        """
-        if not name.startswith("__"):
-            with self.lock:
-                if not self._begun:
-                    self._begin()
-                if name in self.__dict__:
-                    return self.__dict__[name]
-        raise AttributeError(name, name=name, obj=self)
+        else:
+            self.__class__ = _made_late(type(self))
 
     def _begin(self) -> None:
         self._begun = True
@@ -320,3 +309,25 @@ class EpsonSimulator(SteppedController):
 
     def _restore(self, held: Mapping[str, Any]) -> None:
         put_back(held, self.machine, self.variables, self.worlds, now_ns=self.now_ns)
+
+
+@cache
+def _made_late(kind: type[EpsonSimulator]) -> type[EpsonSimulator]:
+    """Return the class of a controller that makes itself at first use, and then is of its own kind.
+
+    A process serves thousands, of which few are ever used; so what stands in ``_make`` costs
+    nothing until then. It is what it would be, had it been made at once. Afterwards nothing is left
+    that would look at each attribute that is found.
+    """
+
+    def missing(self: EpsonSimulator, name: str) -> Any:  # noqa: ANN401 - whatever a controller has
+        if not name.startswith("__"):
+            with self.lock:
+                if not self._begun:
+                    self._begin()
+                    self.__class__ = kind
+                if name in self.__dict__:
+                    return self.__dict__[name]
+        raise AttributeError(name, name=name, obj=self)
+
+    return type(kind.__name__, (kind,), {"__module__": kind.__module__, "__getattr__": missing})

@@ -65,6 +65,7 @@ class Machine:
         robots: All of them.
         motions: Those that any of them began, in order.
         robot_number: The one in force.
+        robot: It.
         inputs: Input bits; the world sets them, or connects them to what the tip meets.
         outputs: Output bits.
         memory: Memory bits.
@@ -124,9 +125,13 @@ class Machine:
         self.control_device = REMOTE_ETHERNET
 
     @property
-    def robot(self) -> DrivenRobot:
-        """The current robot."""
-        return self.robots[self.robot_number - 1]
+    def robot_number(self) -> int:
+        """Number of the current robot."""
+        return self._robot_number
+
+    @robot_number.setter
+    def robot_number(self, number: int) -> None:
+        self._robot_number, self.robot = number, self.robots[number - 1]
 
     @property
     def moving(self) -> bool:

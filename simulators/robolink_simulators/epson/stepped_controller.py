@@ -26,6 +26,7 @@ LAST_COUNT: Final = 1_000_000_000
 
 _TOOLS: Final = range(1, HIGHEST_TOOL + 1)
 _UNDEFINED: Final = (0.0,) * 6
+_RUNNING: Final = Task.RUNNING  # before Python 3.12 a member of an Enum is found slowly
 
 
 class Companion:
@@ -153,6 +154,10 @@ class SteppedController(RequestService, ABC):
         if not self._knows_next:
             if self._at_work:
                 return False
+            if now_ns == self.now_ns and not self._plans:
+                # Only a request came: of time-outs none is due that was not due before it.
+                self._settled_ns, self._known_ns = now_ns, -1
+                return True
             self._next_ns = self._found_next()
         change = self._next_ns
         if change is not None and change <= now_ns:
@@ -163,12 +168,20 @@ class SteppedController(RequestService, ABC):
         return True
 
     @property
+    def _plans(self) -> bool:
+        """Whether something is to happen by itself, perhaps at once, that is no time-out."""
+        return (
+            self._mishaps.next_change() is not None
+            or self.machine.timed_bits.next_change() is not None
+        )
+
+    @property
     def _at_work(self) -> bool:
         """Whether something is in progress that needs checking as time passes."""
         return (
             self.program is not None
             or self._window.busy
-            or self.condition.task is Task.RUNNING
+            or self.condition.task is _RUNNING
             or self.durable
             or self.machine.moving
         )
@@ -183,7 +196,7 @@ class SteppedController(RequestService, ABC):
             self.machine.timed_bits.advance(now_ns)
             self._window.advance(now_ns)
             self._mishaps.carry_out(now_ns)
-            if self._companion is not None and self.condition.task is Task.RUNNING:
+            if self._companion is not None and self.condition.task is _RUNNING:
                 self._companion.publish_changes()
             self._supervise(now_ns)
             self._flash.save_changes()

@@ -32,6 +32,9 @@ from robolink_simulators.epson.arm.robots import (
 )
 from robolink_simulators.epson.condition import OutOfReach
 
+# Before Python 3.12 a member of an Enum is found slowly.
+_FOLDED: Final = Mechanism.FOLDED_SCARA
+_LEFT, _RIGHT = Hand.LEFT, Hand.RIGHT
 _ROUNDING = 1e-9
 _ON_THE_AXIS_MM = 1e-6
 """Distance in mm from the axis of joint 1 below which the flange of an RS leaves joint 1 free. A
@@ -48,14 +51,14 @@ def _scara_hand(model: RobotModel, joints: Joints) -> Hand:
     right elbow does (inferred).
     """
     bend_deg = joints[1] + model.offsets.j2_deg
-    if model.mechanism is Mechanism.FOLDED_SCARA:
+    if model.mechanism is _FOLDED:
         bend_deg = wrapped(bend_deg + _HALF)
-    return Hand.RIGHT if bend_deg >= 0 else Hand.LEFT
+    return _RIGHT if bend_deg >= 0 else _LEFT
 
 
 def _scara_posture(model: RobotModel, joints: Joints) -> Posture | None:
     """Return the joint flags of an RS, ``None`` for other SCARAs, which have none."""
-    if model.mechanism is not Mechanism.FOLDED_SCARA:
+    if model.mechanism is not _FOLDED:
         return None
     first = -_HALF <= joints[0] - _FIRST_TURN_MIDDLE_DEG <= _HALF
     away_mm = 2 * model.lengths_mm[0] * abs(math.sin(math.radians(joints[1]) / 2))
@@ -72,7 +75,7 @@ def _scara_forward(model: RobotModel, joints: Joints) -> Pose:
     added = model.offsets
     inner, outer = math.radians(j1_deg), math.radians(j1_deg + j2_deg + added.j2_deg)
     a1_mm, a2_mm = model.lengths_mm
-    if model.mechanism is Mechanism.FOLDED_SCARA:
+    if model.mechanism is _FOLDED:
         a2_mm = -a2_mm
     return Pose(
         x_mm=a1_mm * math.cos(inner) + a2_mm * math.cos(outer),
@@ -103,13 +106,13 @@ def _scara_solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) 
             f"Point outside the arm's reach: {math.sqrt(distance_sq):.3f} mm from joint 1"
         )
     bend = math.acos(max(-1.0, min(1.0, cosine)))
-    if hand is Hand.LEFT:
+    if hand is _LEFT:
         bend = -bend
     across, along = a2_mm * math.sin(bend), a1_mm + a2_mm * math.cos(bend)
     j1_deg = math.degrees(math.atan2(flange.y_mm, flange.x_mm) - math.atan2(across, along))
     j2_deg = math.degrees(bend)
     low, high = model.ranges[0]
-    if model.mechanism is Mechanism.FOLDED_SCARA:
+    if model.mechanism is _FOLDED:
         if distance_sq < _ON_THE_AXIS_MM**2:
             j1_deg, j2_deg = posture.j1_angle_deg or 0.0, _HALF
         else:

@@ -32,6 +32,9 @@ class Mechanism(StrEnum):
     SIX_AXIS = "six_axis"
 
 
+_SIX_AXIS: Final = Mechanism.SIX_AXIS  # before Python 3.12 a member is found slowly
+
+
 class Mount(StrEnum):
     """What a robot is fixed to; MULTIPLE is a bracket for wall or ceiling."""
 
@@ -128,7 +131,7 @@ class RobotModel:
     @property
     def six_axes(self) -> bool:
         """Whether it can tilt its tool."""
-        return self.mechanism is Mechanism.SIX_AXIS
+        return self.mechanism is _SIX_AXIS
 
     @property
     def hangs(self) -> bool:

@@ -11,7 +11,7 @@ The order of fields is that of Epson's own client; the values are the simulator'
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from functools import cached_property, lru_cache, partial
 from typing import Final
 
@@ -20,7 +20,6 @@ from robolink.protocols.epson_text import (
     Preference,
     RemoteCommand,
     Request,
-    StatusFlags,
     preferences_field,
     status_fields,
 )
@@ -325,7 +324,7 @@ class CommandDesk:
         if executing and not command.allowed_during_execute(options.rc_plus):
             raise RequestRefused(ErrorCode.EXECUTE_RUNNING)
         if command.needs or command.forbids:
-            on = _names_of(self._condition.flags())
+            on = self._condition.names_on()
             if not (command.needs <= on and command.forbids.isdisjoint(on)):
                 raise RequestRefused(ErrorCode.NOT_READY)
 
@@ -403,9 +402,3 @@ class CommandDesk:
         if self._options.reset_outputs_off:
             self._machine.clear_outputs()
         return ()
-
-
-@lru_cache(maxsize=512)
-def _names_of(flags: StatusFlags) -> frozenset[str]:
-    """Return the names of the flags that are on."""
-    return frozenset(one.name for one in fields(flags) if getattr(flags, one.name))

@@ -25,6 +25,7 @@ from robolink.fleet.plans import Plan
 from robolink.fleet.progress import CellJob, JobOutcome, Permit, PlanProgress
 from robolink.fleet.silence import LOOK_S, CellLine, SilentJobs
 from robolink.fleet.states import JobState, PlanKind, WaitReason
+from robolink.fleet.store.homes import require_all_cells
 from robolink.fleet.store.store import FleetStore
 from robolink.fleet.watchdog import notify
 from robolink.journal._places import place_of
@@ -236,19 +237,10 @@ class Agent:
         if not self._shared or plan.homes or progress.bound_to or plan.kind not in UNATTENDED:
             return
         try:
-            missing = [] if self._cells is None else sorted({*plan.cells} - {*self._cells()})
+            if self._cells is not None:
+                require_all_cells(plan, self._cells())
         except ConfigError as error:
             raise PlanError(error.what, remedy=error.remedy) from error
-        if missing:
-            raise PlanError(
-                tr(
-                    "Plan {plan} waits for a computer that has all of its cells; this one has no "
-                    "{cells}.",
-                    plan=plan.id,
-                    cells=", ".join(missing[:3]),
-                ),
-                remedy=tr("Name the home of each cell in the cell files, then make the plan anew."),
-            )
 
     def _record_cut(self) -> None:
         """Record how jobs ended that were cut off, and name their cells.

@@ -43,17 +43,12 @@ _POLL_S: Final = 0.1
 _BESIDES: Final = 8
 """Threads and connections beside those of the workers, for the engine's own looks."""
 
-_LOGGED: Final = ("journal_mode=WAL", "synchronous=NORMAL")
-
 
 class QueuePlace(StrEnum):
     """Where a job stands that was handed out and has not ended, in DBOS's words."""
 
     WAITING = "ENQUEUED"
     RUNNING = "PENDING"
-
-
-_PLACES: Final = tuple(map(str, QueuePlace))
 
 
 class JobEndedError(Exception):
@@ -93,7 +88,7 @@ class Engine:
         self._room = runtime.waiting_room()
         self._running: set[str] = set()
         self._idle: frozenset[str] = frozenset()
-        self._news = self._draining = False
+        self._news = self._draining = self._ended = False
 
     @classmethod
     def of_process(cls) -> "Engine":
@@ -110,6 +105,7 @@ class Engine:
         logging.getLogger("dbos").addHandler(logging.NullHandler())  # else it fills the console
         json = DBOSPortableJSONSerializer()
         Engine._one, self._database = self, _database(self._url, self._workers + _BESIDES)
+        event.listen(self._database, "checkout", self._require_not_ended)
         DBOS(
             config={
                 "name": "robolink-fleet",
@@ -179,7 +175,7 @@ class Engine:
         """
         with self._reached():
             found = self._client.list_workflows(
-                queue_name=self._queue, status=[*_PLACES], load_input=False, load_output=False
+                queue_name=self._queue, status=[*QueuePlace], load_input=False, load_output=False
             )
         return {one.workflow_id: QueuePlace(one.status) for one in found}
 
@@ -257,8 +253,12 @@ class Engine:
 
     def _end(self) -> None:
         DBOS.destroy()
+        Engine._one, self._ended = None, True
         self._database.dispose()
-        Engine._one = None
+
+    def _require_not_ended(self, *_: object) -> None:
+        if self._ended:  # else DBOS asks for ever how a job ended that another process took over
+            raise JobEndedError
 
     @contextmanager
     def _reached(self) -> Iterator[None]:
@@ -293,7 +293,8 @@ def _prepare_file(connection: sqlite3.Connection, _record: object) -> None:
     What the power takes from the file is handed out again, so that a commit waits for no disk.
     """
     connection.isolation_level = "IMMEDIATE"
-    for setting in ("busy_timeout=30000", "foreign_keys=ON", *_LOGGED):
+    waits, logged = "busy_timeout=30000", ("journal_mode=WAL", "synchronous=NORMAL")
+    for setting in (waits, "foreign_keys=ON", *logged):
         connection.execute(f"PRAGMA {setting}")
     if sqlite3.sqlite_version_info < (3, 42):  # it has no "subsec", which DBOS asks for
         connection.create_function("unixepoch", 1, lambda _subsec: runtime.wall_s())

@@ -357,6 +357,8 @@ class PlanProgress:
         cancelled_at: When it was cancelled; empty where it was not.
         bound_to: The computer that carries it out, where its cells name no home and one has begun.
         homes: The homes of its cells, by their :func:`~robolink.journal.computer_key`.
+        claimants: The keys of the computers one of which carries it out, where it has no home yet;
+            empty for any.
     """
 
     plan: Plan
@@ -366,20 +368,23 @@ class PlanProgress:
     cancelled_at: str = ""
     bound_to: str = ""
     homes: Mapping[str, PlantHome] = field(default_factory=dict, hash=False)
+    claimants: frozenset[str] = frozenset()
 
     def home_of(self, cell: str) -> PlantHome | None:
         """Return the home of a cell; ``None`` where its job may be carried out on any computer."""
         return self.homes.get(computer_key(self.plan.homes.get(cell) or self.bound_to))
 
     def is_at_home(self, cell: str, computer: str) -> bool:
-        """Return whether the job of a cell is carried out by a computer.
+        """Return whether the job of a cell is carried out by a computer, or may come to be.
 
         Args:
             cell: The cell.
             computer: Name of the computer.
         """
         home = self.home_of(cell)
-        return home is None or computer_key(home.home) == computer_key(computer)
+        if home is not None:
+            return computer_key(home.home) == computer_key(computer)
+        return not self.claimants or computer_key(computer) in self.claimants
 
     def homes_left(self) -> tuple[PlantHome, ...]:
         """Return the homes at which a job of it waits or runs."""

@@ -20,7 +20,7 @@ from robolink_cli.commands.fleet.rollout import Rollout
 
 from robolink.fleet import PlanProgress
 from tests.contract.journal._postgresql import Server
-from tests.fleet._cells import ClockFile
+from tests.fleet._cells import ClockFile, LateCells
 
 REFUSED = 5
 """Exit code of a second agent of a plant."""
@@ -87,10 +87,12 @@ class Frozen:
     seen: list[dict[str, Any]] = field(default_factory=list)
 
     def __call__(self, progress: PlanProgress) -> bool:
+        first = self.rollout.agent
+        if first is None or first.poll() is not None:
+            return False  # another fault has ended it: the next one is frozen
         if not self.moments.come(progress):
             return False
-        first, seconds = self.rollout.agent, self.seconds.pop(0)
-        assert first is not None
+        seconds = self.seconds.pop(0)
         usurped = self.server is not None and len(self.seen) % 2 == 1
         first.send_signal(signal.SIGSTOP)
         begun = time.monotonic()
@@ -239,3 +241,36 @@ class ComeBack:
             self.serve()
             self.seen.append({"came_back": True})
         return False
+
+
+@dataclass
+class WindowOver:
+    """Clocks that end a rollout of which some cells stay off, instead of waiting for its window.
+
+    When only cells are left that were off at first, the agent's clock is set back before all of
+    its labels: so those that came back are due at once. When only those are left that are off
+    still, it is set behind the end of the window.
+    """
+
+    clock: ClockFile
+    late: LateCells
+    seen: list[dict[str, Any]] = field(default_factory=list)
+
+    BACK_DAYS = -1 - 1 / 24
+    OVER_DAYS = 2 + 4 / 24
+
+    def __call__(self, progress: PlanProgress) -> bool:
+        left = [job for job in progress.jobs if not job.state.final]
+        if not left or not self.late.cells or any(job.cell not in self.late.urls for job in left):
+            return False
+        off = all(job.cell not in self.late.cells for job in left)
+        tried = all(job.treatment is not None and job.treatment.again for job in left)
+        if not self.seen:
+            self._set(self.BACK_DAYS)
+        elif len(self.seen) == 1 and off and tried:
+            self._set(self.OVER_DAYS)
+        return False
+
+    def _set(self, days: float) -> None:
+        self.clock.set(days)
+        self.seen.append({"left_clock_days": round(days, 2)})

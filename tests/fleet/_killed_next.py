@@ -74,7 +74,7 @@ def killed_at_commit(number: int) -> None:
 def killed_where(where: str) -> None:
     begin: Callable[..., Any] = FleetStore.begin
     if where == "begun":
-        FleetStore.begin = lambda *given: killed(begin(*given))  # type: ignore[assignment,method-assign]
+        FleetStore.begin = lambda *given, **named: killed(begin(*given, **named))  # type: ignore[assignment,method-assign]
     elif where == "unreported":
         FleetStore.record_outcome = killed  # type: ignore[assignment,method-assign]
     else:

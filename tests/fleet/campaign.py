@@ -6,7 +6,7 @@
     python -m tests.fleet.campaign --cells 200 --disk-full 10        # needs root
     python -m tests.fleet.campaign --cells 200 --clock 1,-1 --cells-clock -1
     python -m tests.fleet.campaign --cells 200 --off 0.3
-    python -m tests.fleet.campaign --cells 3 --commits
+    python -m tests.fleet.campaign --cells 3 --commits --database postgresql
 
 `sim run` serves the cells in a process of its own; the agent is the product's own command. What
 befalls it comes at random moments of the last ring (``_faults.py``), and faults may be combined.
@@ -34,6 +34,8 @@ from robolink_cli.commands.fleet.rollout import TOOL, Rollout
 from robolink_simulators.control.client import ControlClient
 
 from robolink.fleet import HaltRule, JobState, PlanProgress
+from robolink.journal import open_journal
+from robolink.model import EntryKind
 from tests.contract.journal._postgresql import Server, served
 from tests.fleet._cells import ClockFile, LateCells, served_cells
 from tests.fleet._faults import (
@@ -45,6 +47,7 @@ from tests.fleet._faults import (
     Frozen,
     Moments,
     RandomKills,
+    WindowOver,
     small_disks,
 )
 
@@ -53,9 +56,13 @@ MOST = 2000
 """Cells that are served at once."""
 
 WINDOW_MIN = 6
-"""How long a plan may take whose cells are off in part."""
+"""How long a plan may take whose cells are off in part, where no clock is set."""
+
+AROUND_H = 3
+"""How far the window of such a plan reaches where clocks are set, to both sides."""
 
 SMALL_MB = 24
+"""Size of a small disk; one more for each 25 cells."""
 
 
 def counted(cells: Mapping[str, Any]) -> dict[str, tuple[int, float]]:
@@ -67,6 +74,24 @@ def counted(cells: Mapping[str, Any]) -> dict[str, tuple[int, float]]:
             stored = control.do("truth")["stored"].get(str(TOOL))
         found[name] = (int(writes), float(stored["x_mm"]) if stored else 0.0)
     return found
+
+
+def put_back(record: Path, writes: Mapping[str, int]) -> set[str]:
+    """Return the cells that were written more than once because a job put the old value back.
+
+    A job does so whose write it cannot record, on a full disk say. It is two writes, and the next
+    delivery makes a third: an odd number, for no more attempts than the record says left nothing.
+    """
+    journal = open_journal(str(record), read_only=True)
+    attempts: dict[str, set[str]] = {}
+    for entry in journal.entries(kinds=[EntryKind.ROLLED_BACK, EntryKind.NOT_APPLIED]):
+        cell = str(entry.details.get("order", "")).partition("/")[2]
+        attempts.setdefault(cell, set()).add(entry.change)
+    return {
+        cell
+        for cell, count in writes.items()
+        if count > 1 and count % 2 and count // 2 <= len(attempts.get(cell, ()))
+    }
 
 
 def killing_itself(life: int, number: int) -> tuple[str, ...]:
@@ -86,6 +111,8 @@ def verdict(
         found: Writes and value by cell; a cell that was never served is missing.
     """
     states = Counter(str(job.state) for job in progress.jobs)
+    writes = {cell: count for cell, (count, _) in found.items()}
+    back = put_back(rollout.journal, writes)
     told = [job for job in progress.jobs if job.state in (JobState.MISSED, JobState.REFUSED)]
     lost = [
         job.cell
@@ -104,7 +131,8 @@ def verdict(
         "states": dict(states),
         "recovered": len(rollout.count.recovered),
         "written": sum(writes > 0 for writes, _ in found.values()),
-        "written_twice": sum(writes > 1 for writes, _ in found.values()),
+        "written_twice": sum(count > 1 and cell not in back for cell, count in writes.items()),
+        "put_back": len(back),
         "kept_with_another_value": sum(
             job.state is JobState.UNPROVED and abs(found[job.cell][1] - X_MM) > 1e-9
             for job in progress.jobs
@@ -135,23 +163,25 @@ def under_faults(given: argparse.Namespace, count: int, seed: int) -> dict[str, 
         server = stack.enter_context(_server()) if given.database == "postgresql" else None
         database = server.url() if server else ""
         options: dict[str, Any] = {}
+        accepts: list[HaltRule] = []
         disks: list[Path] = []
         if given.disk_full:
             names = ("state", "plant", "jobs")
-            stack.enter_context(small_disks(folder, names, SMALL_MB))
+            stack.enter_context(small_disks(folder, names, SMALL_MB + count // 25))
             disks = [folder / one for one in names]
             if server is None:
                 database = str(folder / "plant" / "fleet.db")
                 (folder / "plant" / "fleet.db.jobs").symlink_to(folder / "jobs" / "fleet.db.jobs")
             else:
                 disks = disks[:1]
-            options |= {"accepts": [HaltRule.CAUSE], "restarts": True}
+            accepts.append(HaltRule.CAUSE)
+            options["restarts"] = True
         clock = ClockFile(folder, "clock") if given.clock else None
         if clock is not None:
             options["program"] = lambda _life: clock.program
         errs = max(given.frozen, default=0.0) >= REMOTE_TIMEOUT_S
         if errs:
-            options["accepts"] = [HaltRule.REFUSALS]
+            accepts.append(HaltRule.REFUSALS)
         off = round(count * given.off)
         program = ClockFile(folder, "cells-clock", days=given.cells_clock).program
         cells = dict(stack.enter_context(served_cells(folder, count - off, program=program)))
@@ -160,9 +190,11 @@ def under_faults(given: argparse.Namespace, count: int, seed: int) -> dict[str, 
         if late is not None:
             urls |= late.urls
             now = datetime.now().astimezone()
-            until = now + timedelta(minutes=WINDOW_MIN)
-            options |= {"window": f"{now:%H:%M}-{until:%H:%M}", "longest_s": 90.0 * WINDOW_MIN}
-        rollout = Rollout(folder, urls, X_MM, database=database, **options)
+            around = timedelta(hours=AROUND_H)
+            until = now + (timedelta(minutes=WINDOW_MIN) if clock is None else around)
+            since = now if clock is None else now - around
+            options |= {"window": f"{since:%H:%M}-{until:%H:%M}", "longest_s": 90.0 * WINDOW_MIN}
+        rollout = Rollout(folder, urls, X_MM, database=database, accepts=accepts, **options)
         begun = time.monotonic()
         plan = rollout.make()
         planned_s = time.monotonic() - begun
@@ -216,6 +248,8 @@ def _faults(
         yield ClockSet(clock, [*given.clock], moments(len(given.clock)))
     if late is not None:
         yield ComeBack(late.come_back, moments(1))
+    if late is not None and clock is not None:
+        yield WindowOver(clock, late)
 
 
 def at_every_commit(
@@ -230,25 +264,30 @@ def at_every_commit(
         tell: Receives each count.
     """
     wrong, number = 0, first
-    while True:
-        with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
-            server = stack.enter_context(_server()) if database == "postgresql" else None
-            cells = stack.enter_context(served_cells(Path(name), count))
-            rollout = Rollout(
-                Path(name),
-                {one: str(about["url"]) for one, about in cells.items()},
-                X_MM,
-                database=server.url() if server else "",
-                program=lambda life: killing_itself(life, number),  # noqa: B023 - called within
-                rings=(1, "rest"),
-            )
-            progress = rollout.carry_out(rollout.make(), lambda _progress: False)
-            found = verdict(rollout, progress, counted(cells))
-        tell({"point": number, **found})
-        wrong += int(sum(found.get(key, 0) for key in WRONG))
-        if not rollout.count.kills:
-            return wrong
-        number += 1
+    with ExitStack() as whole:
+        server = whole.enter_context(_server()) if database == "postgresql" else None
+        while True:
+            found = _killed_at(number, count, server)
+            tell({"point": number, **found})
+            wrong += int(sum(found.get(key, 0) for key in WRONG))
+            if not found["kills"]:
+                return wrong
+            number += 1
+
+
+def _killed_at(number: int, count: int, server: Server | None) -> dict[str, Any]:
+    """Carry a rollout out whose first agent is killed at a commit; return what was counted."""
+    with tempfile.TemporaryDirectory() as name, served_cells(Path(name), count) as cells:
+        rollout = Rollout(
+            Path(name),
+            {one: str(about["url"]) for one, about in cells.items()},
+            X_MM,
+            database=server.empty_database() if server else "",
+            program=lambda life: killing_itself(life, number),
+            rings=(1, "rest"),
+        )
+        progress = rollout.carry_out(rollout.make(), lambda _progress: False)
+        return verdict(rollout, progress, counted(cells))
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robolink.fleet import FleetStore
-from tests.contract.journal._postgresql import Server, is_installed, served
+from tests.contract.journal._postgresql import Server
 from tests.fleet._moving_cells import MovingCells, moving_cells
 
 
@@ -30,15 +30,6 @@ class Wall:
 @pytest.fixture
 def wall() -> Wall:
     return Wall()
-
-
-@pytest.fixture(scope="session")
-def server() -> Iterator[Server]:
-    """A PostgreSQL server."""
-    if not is_installed():
-        pytest.skip("PostgreSQL is not installed here: initdb and postgres are missing")
-    with served() as server:
-        yield server
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.soak)])

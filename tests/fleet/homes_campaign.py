@@ -4,19 +4,21 @@
 
 `sim run` serves the cells in a process of its own; each home is an agent, the product's own
 command, with a journal of its own, on a computer of a name of its own; PostgreSQL is the plant's.
-The agents are killed at random moments, one at a time. Each cell is to be written once, and by its
-home: what is printed was read from all controllers and both journals at the end.
+Each is killed at commits of its own that are drawn by chance, however slow this computer is. Each
+cell is to be written once, and by its home: what is printed was read from all controllers and both
+journals at the end.
 """
 
 import argparse
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -30,7 +32,10 @@ from tests.fleet.campaign import X_MM, counted
 
 HOMES = ("PC7", "pc8.plant.local")
 _MOST_S = 240.0
-"""Longest time without any progress, in s."""
+"""Longest time without any progress, and of a command, in s."""
+
+_COMMITS = 8
+"""Fewest commits that an agent makes for a cell."""
 
 
 class Computers:
@@ -40,10 +45,17 @@ class Computers:
         folder: Takes the cell file and what each computer keeps.
         urls: Of the cells, by name.
         database: The plant's database.
+        kills: At which commits the agents of a home are killed, one after the other.
+
+    Attributes:
+        killed: How many were.
     """
 
-    def __init__(self, folder: Path, urls: Mapping[str, str], database: str) -> None:
+    def __init__(
+        self, folder: Path, urls: Mapping[str, str], database: str, kills: Mapping[str, list[int]]
+    ) -> None:
         self.folder, self.database = folder, database
+        self.killed, self._kills = 0, {name: [*numbers] for name, numbers in kills.items()}
         self.home_of = {name: HOMES[place % 2] for place, name in enumerate(urls)}
         lines = [
             f'[cells.{name}]\nurl = "{url}"\nhome = "{self.home_of[name]}"\n'
@@ -67,24 +79,23 @@ class Computers:
     def command(self, name: str, *words: str) -> tuple[int, str]:
         """Run a command on a computer; return its exit code and what it printed."""
         process = self.started(name, *words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        said, _ = process.communicate(timeout=60)
+        said, _ = process.communicate(timeout=_MOST_S)
         return process.returncode, said.decode(errors="replace")
 
-    def start(self, names: Iterable[str] = HOMES) -> None:
-        """Start agents."""
-        for name in names:
+    def start(self) -> None:
+        """Start agents where none runs; one that was not killed must not have ended."""
+        for name in HOMES:
+            agent = self._agents.get(name)
+            if agent is not None:
+                if agent.poll() is None:
+                    continue
+                assert agent.returncode == -signal.SIGKILL, _logs(self.folder)
+                self.killed += 1
+            numbers = self._kills.get(name)
+            killed_at = ("--killed-at", str(numbers.pop(0))) if numbers else ()
+            words = (*killed_at, "cell", "fleet", "agent")
             with (self.folder / f"{name}.log").open("ab") as log:
-                self._agents[name] = self.started(
-                    name, "cell", "fleet", "agent", stdout=log, stderr=log
-                )
-
-    def kill(self, name: str) -> None:
-        """Kill an agent."""
-        agent = self._agents.pop(name, None)
-        if agent is not None:
-            assert agent.poll() is None, (self.folder / f"{name}.log").read_text()
-            agent.kill()
-            agent.wait()
+                self._agents[name] = self.started(name, *words, stdout=log, stderr=log)
 
     def end(self) -> None:
         """Kill what runs."""
@@ -104,30 +115,24 @@ def carried_out(folder: Path, count: int, kills: int, database: str, seed: int) 
     chance = random.Random(seed)
     with served_cells(folder, count) as cells:
         urls = {name: str(about["url"]) for name, about in cells.items()}
-        here = Computers(folder, urls, database)
+        here = Computers(folder, urls, database, _drawn(chance, count, kills))
         plan = _plan(list(urls), here.home_of)
         with FleetStore(database, home="office") as store:
             store.add_plan(plan)
             store.give_permit(_permit())
             begun_s = seen_s = time.monotonic()
             ended = 0
-            here.start()
-            at = sorted(chance.sample(range(6, count - 1), kills))
-            recovered, killed = [], 0
+            recovered: list[str] = []
             try:
                 while not (progress := store.progress(plan.id)).finished or progress.standing:
                     over = sum(job.state.final for job in progress.jobs)
                     if over != ended:
                         ended, seen_s = over, time.monotonic()
                     assert time.monotonic() < seen_s + _MOST_S, (progress.counts(), _logs(folder))
+                    here.start()
                     if progress.standing:
                         recovered += _be_the_person(here, store, progress)
-                    elif at and over >= at[0]:
-                        at.pop(0)
-                        name = chance.choice(HOMES)
-                        here.kill(name)
-                        killed += 1
-                        here.start([name])
+                        seen_s = time.monotonic()
                     time.sleep(0.05)
                 seconds = time.monotonic() - begun_s
             finally:
@@ -139,7 +144,7 @@ def carried_out(folder: Path, count: int, kills: int, database: str, seed: int) 
     orders = {name: here.orders(name) for name in HOMES}
     return {
         "cells": count,
-        "kills": killed,
+        "kills": here.killed,
         "seconds": round(seconds, 1),
         "recovered": len(recovered),
         "written": sum(writes > 0 for writes, _ in found.values()),
@@ -152,6 +157,17 @@ def carried_out(folder: Path, count: int, kills: int, database: str, seed: int) 
         "not_on_record_at_home": sum(len(at_home[name] - orders[name]) for name in HOMES),
         "heard": sorted(one.home for one in progress.homes.values() if one.heard_at),
     }
+
+
+def _drawn(chance: random.Random, count: int, kills: int) -> dict[str, list[int]]:
+    """Draw the commits at which agents are killed; each of them comes to pass."""
+    found: dict[str, list[int]] = {name: [] for name in HOMES}
+    for number in range(kills):
+        found[HOMES[number % 2]].append(0)
+    for numbers in found.values():
+        most = 2 * _COMMITS * (count // 2) // max(1, len(numbers))
+        numbers[:] = [chance.randrange(most) for _ in numbers]
+    return found
 
 
 def _plan(cells: list[str], homes: Mapping[str, str]) -> Any:

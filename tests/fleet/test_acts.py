@@ -1,10 +1,12 @@
 """What an agent does at a cell: once an order, recorded, and never by moving a robot."""
 
 import json
+import sqlite3
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,7 @@ from robolink import transaction
 from robolink.errors import ConnectError
 from robolink.fleet import Permit, Treatment, plan_of, treatment_of
 from robolink.journal import default_location, open_journal, this_computer
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.model import EntryKind, MarkerKind, ToolOffset
 from robolink.stopping import holders_of
 from robolink.transport import far_end_of, parse_url
@@ -236,7 +239,7 @@ def test_a_check_leaves_a_cell_alone_at_which_somebody_works(acts, simulator):
         "    sys.stdin.read()\n"
     )
     with subprocess.Popen(
-        [sys.executable, "-c", program, simulator.url],
+        [sys.executable, "-m", "tests._program", program, simulator.url],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -307,3 +310,30 @@ def test_nothing_is_done_where_the_cell_file_names_another_home(kind, acts, cell
     assert not list(simulator.log)
     cell_file.write_text(f'{said}home = "{this_computer()}"\n')
     assert acts(plan(kind), "a", PERMIT).error == ""
+
+
+@pytest.mark.parametrize("at", [7, 8])
+def test_a_write_that_cannot_be_recorded_is_put_back_and_written_by_the_next_delivery(
+    acts, simulator, monkeypatch, at
+):
+    before, made = tool_of(simulator), plan("offset")
+    commit, commits = DatabaseConnection.commit, count(1)
+
+    def full(database):
+        if next(commits) == at:  # of the entry behind the write, or of the end of the order
+            database.roll_back()
+            raise sqlite3.OperationalError("database or disk is full")
+        commit(database)
+
+    with monkeypatch.context() as once:
+        once.setattr(DatabaseConnection, "commit", full)
+        first = acts(made, "a", PERMIT)
+    assert (first.error, treatment(first)) == ("JournalError", Treatment.HALT)
+    assert tool_of(simulator) == before
+    assert simulator.machine.flash_writes == 2
+    assert entries(EntryKind.ORDER) == []
+    again = acts(made, "a", PERMIT)
+    assert (again.code, again.what) == (0, "Written and read back.")
+    assert (simulator.machine.flash_writes, tool_of(simulator).x_mm) == (3, 12.7)
+    told = {entry.details.get("order") for entry in entries(EntryKind.ROLLED_BACK)}
+    assert made.order("a") in told

@@ -65,7 +65,9 @@ def test_the_lock_of_a_killed_agent_is_free(location):
         "    time.sleep(60)\n"
     )
     process = subprocess.Popen(
-        [sys.executable, "-c", program, location], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "tests._program", program, location],
+        stdout=subprocess.PIPE,
+        text=True,
     )
     with process:
         assert process.stdout is not None

@@ -1,14 +1,25 @@
 """The product's own agent at twenty simulated cells, killed twice: each is written once."""
 
 import json
+import time
+from types import SimpleNamespace
 
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.fleet import rollout
 from robolink_cli.commands.fleet.demo import CELLS, X_MM, require_right
 
 
 @pytest.mark.timeout(240)
-def test_twenty_cells_are_written_once_each_although_the_agent_is_killed_twice(capsys):
+@pytest.mark.parametrize("late_s", [0.0, pytest.param(3.0, marks=pytest.mark.soak)])
+def test_twenty_cells_are_written_once_each_although_the_agent_is_killed_twice(
+    capsys, monkeypatch, late_s
+):
+    # On a busy computer the person looks at the plan late.
+    late = SimpleNamespace(
+        monotonic=time.monotonic, sleep=lambda wait_s: time.sleep(wait_s + late_s)
+    )
+    monkeypatch.setattr(rollout, "time", late)
     assert main.run(["--json", "fleet", "demo"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown["kills"] == 2

@@ -12,6 +12,7 @@ import time
 from collections import Counter
 
 import pytest
+from sqlalchemy import text
 
 from robolink.fleet.engine import Engine, JobEndedError, QueuePlace
 from robolink.fleet.errors import PlantError
@@ -57,6 +58,30 @@ class Cells:
             self.at_work[cell] -= 1
         if order.startswith("refused"):
             raise JobEndedError("the cell said no")
+
+
+def test_no_thread_outlives_an_engine_whose_job_another_one_took_over(url):
+    def taken_over(_order):
+        with engine._database.begin() as transaction:
+            transaction.execute(text(f"UPDATE {schema}workflow_status SET owner_xid = 'another'"))
+        over.set()
+
+    def threads():
+        return {one for one in threading.enumerate() if not one.daemon} - before
+
+    schema = "dbos." if "://" in url and "sqlite" not in url else ""
+    over, before = threading.Event(), {*threading.enumerate()}
+    engine = Engine(url, "plant", taken_over, workers=1)
+    engine.start()
+    engine.hand_out(jobs("a/c1"))
+    assert over.wait(30)
+    time.sleep(1.5)  # it asks for the result once a second
+    assert threads()
+    assert engine.stop(10) == frozenset()
+    deadline = time.monotonic() + 20
+    while threads():
+        assert time.monotonic() < deadline, threads()
+        time.sleep(0.05)
 
 
 def until(engine, condition):

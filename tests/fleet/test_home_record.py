@@ -4,6 +4,7 @@ import platform
 import shutil
 from collections import defaultdict
 from datetime import UTC, datetime, timedelta
+from functools import partial
 
 import pytest
 from robolink_cli.commands.fleet.agent import agent_here
@@ -364,10 +365,10 @@ def test_a_turn_test_of_before_the_write_proves_nothing(home):
         "failed",
         "another value",
         "another tool",
-        "written again between",
         "another cell",
         "put back",
-        "found otherwise",
+        "put back after the test of another",
+        "another value while it was tested",
         "contradicted",
     ],
 )
@@ -384,18 +385,21 @@ def test_what_does_not_prove_it(home, then):
             turned(controller, ToolOffset(12.701, -3.5, -20))
         case "another tool":
             turned(controller, WRITTEN, tool=2)
-        case "written again between":
-            write(controller, ToolOffset(1, 2, 3))
-            write(controller, WRITTEN)
-            turned(controller, WRITTEN)
         case "another cell":
             turned(home.controller("b"), WRITTEN)
         case "put back":
             turned(controller, WRITTEN, kept=False)
-        case "found otherwise":
-            found = {"before": [1, 2, 3, 0, 0, 0], "requested": list(WRITTEN.components())}
-            controller.outcomes.append(NewEntry(EntryKind.INTENT, tool=1, details=found))
-            turned(controller, WRITTEN)
+        case "put back after the test of another":
+            turned(controller, ToolOffset(12.9, -3.5, -20))
+            write(controller, WRITTEN)
+        case "another value while it was tested":
+            other = [12.9, -3.5, -20, 0, 0, 0]
+            of_it = partial(NewEntry, change="c-9", tool=1)
+            controller.outcomes.append(
+                of_it(EntryKind.READ_BACK, details={"value": other}),
+                of_it(EntryKind.VERIFY, details={"passed": True}),
+                of_it(EntryKind.DECISION, details={"value": list(WRITTEN.components())}),
+            )
         case "contradicted":
             said = {"passed": True, "judgement": {"code": "proof_contradicts_accuracy"}}
             kept = {"value": list(WRITTEN.components())}
@@ -406,6 +410,32 @@ def test_what_does_not_prove_it(home, then):
     assert job(home, plan).state is JobState.UNPROVED
     home.restarted()
     assert job(home, plan).state is JobState.UNPROVED
+
+
+@pytest.mark.parametrize("between", ["written by hand", "by a change", "seen by a change"])
+def test_a_value_that_was_put_back_is_proved_by_a_test_of_its_own(home, between):
+    home.add("a")
+    plan = offset_plan(home, ["a"])
+    controller = ordered(home, plan, "a")
+    match between:
+        case "written by hand":
+            write(controller, ToolOffset(1, 2, 3))
+            write(controller, WRITTEN)
+        case "by a change":
+            with pytest.raises(VerifyError):
+                turned(controller, ToolOffset(12.9, -3.5, -20), drift_mm=0.5)
+        case "seen by a change":
+            found = {"before": [1, 2, 3, 0, 0, 0], "requested": list(WRITTEN.components())}
+            controller.outcomes.append(NewEntry(EntryKind.INTENT, tool=1, details=found))
+    assert job(home, plan).state is JobState.UNPROVED
+    turned(controller, WRITTEN)
+    (*_, test) = sorted(
+        one.number for one in controller.outcomes.recorded(kinds=(EntryKind.VERIFY,))
+    )
+    found = job(home, plan)
+    assert (found.state, found.proof) == (JobState.KEPT, test)
+    home.restarted()
+    assert job(home, plan).state is JobState.KEPT
 
 
 def test_a_test_that_comes_while_nobody_looks_counts_and_so_does_one_before_the_outcome(home):

@@ -159,6 +159,32 @@ def test_a_plan_without_homes_is_carried_out_by_the_computer_that_begins(at, loc
 
 
 @ON_A_SERVER
+def test_a_plan_without_homes_is_no_other_computers_once_an_agent_was_heard(at):
+    pc7, laptop = at("PC7"), at("laptop")
+    plan = plan_with(6, "check")
+    pc7.add_plan(plan)
+    pc7.hear_home("another plant")
+    assert laptop.progress(plan.id).is_at_home(CELLS[0], "laptop")  # any, as long as none is heard
+    pc7.hear_home("plant")
+    assert laptop.begin(plan.id, CELLS[0]).why is WaitReason.HOME
+    assert not laptop.progress(plan.id).is_at_home(CELLS[0], "laptop")
+    assert pc7.progress(plan.id).bound_to == ""
+    assert pc7.begin(plan.id, CELLS[0]).begun
+    assert pc7.progress(plan.id).bound_to == "PC7"
+
+
+@ON_A_SERVER
+def test_a_computer_without_all_cells_does_not_begin_a_plan_without_homes(at):
+    pc7, pc8 = at("PC7"), at("PC8")
+    plan = plan_with(6, "check")
+    pc7.add_plan(plan)
+    with pytest.raises(PlanError, match=f"this one has no {CELLS[5]}"):
+        pc8.begin(plan.id, CELLS[0], cells=CELLS[:5])
+    assert pc7.progress(plan.id).jobs[0].state is JobState.WAITING
+    assert pc7.begin(plan.id, CELLS[0], cells=[*CELLS, "other"]).begun
+
+
+@ON_A_SERVER
 def test_what_a_line_orders_is_carried_out_by_the_computer_that_took_it(at, location, wall):
     asked = line_order_of({"order": "A-17", "cell": CELLS[0], "kind": "check"})
     plan = asked.plan("mes", cells=CELLS, recipes={})
@@ -291,8 +317,8 @@ def test_run_waits_for_a_home_at_work_and_not_for_a_silent_one(
 @pytest.mark.soak
 @pytest.mark.timeout(400)
 def test_agents_of_two_homes_that_are_killed_write_once_and_each_at_its_own(server, tmp_path):
-    found = homes_campaign.carried_out(tmp_path, 20, 3, server.empty_database(), seed=1)
-    assert (found["written"], found["kills"], len(found["heard"])) == (20, 3, 2)
+    found = homes_campaign.carried_out(tmp_path, 12, 3, server.empty_database(), seed=1)
+    assert (found["written"], found["kills"], len(found["heard"])) == (12, 3, 2)
     for count in ("written_twice", "lost", "by_the_wrong_home", "not_on_record_at_home"):
         assert found[count] == 0, found
 

@@ -1,18 +1,23 @@
 """What a plant tells a real broker: states, and each event in order, whatever stops in between."""
 
+import signal
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import time
 from contextlib import ExitStack, suppress
+from types import SimpleNamespace
 
 import pytest
 from robolink_cli.commands.fleet.agent import unit
 
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, LeaseHeldError
 from robolink.fleet import CellState, FleetStore, PlantNotes
+from robolink.fleet.agent_lock import AgentLock
 from robolink.fleet.plant_view import mqtt_feed
-from robolink.fleet.plant_view.mqtt_feed import MqttFeed, broker_of
+from robolink.fleet.plant_view.mqtt_feed import MqttFeed, broker_of, publisher_lock
 from robolink.model import Secret
 from tests._documents import wrong_in
 from tests.fleet._broker import NEEDED, Broker, Listener
@@ -151,6 +156,133 @@ def test_what_a_broker_did_not_acknowledge_is_delivered_by_the_next_agent(
     ended(location, wall, plan, (1, 2, 3))
     feed(broker)
     heard.until(lambda one: [event["number"] for event in one.events] == [1, 2, 3])
+
+
+PUBLISHER = """
+import sys
+from robolink.fleet import PlantNotes
+from robolink.fleet.plant_view.mqtt_feed import MqttFeed, broker_of, publisher_lock
+location, broker = sys.argv[1], broker_of(sys.argv[2])
+lock = publisher_lock(location, "plant", broker)
+with PlantNotes(location, "plant") as notes, MqttFeed(broker, notes, "plant", lock=lock).running():
+    sys.stdin.read()
+"""
+
+
+@NEEDED
+@pytest.mark.soak
+@pytest.mark.parametrize("location", ["postgresql"], indirect=True)
+@pytest.mark.parametrize("ends", ["in order", "killed"])
+def test_of_two_agents_one_publishes_and_the_other_goes_on_when_it_is_gone(
+    broker, feed, stack, location, wall, told, ends
+):
+    plan = planned(location, wall)
+    heard = listener(stack, broker)
+    command = [sys.executable, "-m", "tests._program", PUBLISHER, location, broker.url]
+    first = stack.enter_context(subprocess.Popen(command, stdin=subprocess.PIPE, text=True))
+    stack.callback(first.kill)
+    heard.until(lambda them: them.retained.get("robots/plant/agent", {}).get("up"))
+    lock = publisher_lock(location, "plant", broker_of(broker.url))
+    assert lock is not None
+    feed(broker, lock=lock)
+    eventually(lambda: told)
+    assert f" {first.pid} publishes to the broker {broker.url}." in told[0]
+    ended(location, wall, plan, (1, 2))
+    heard.until(lambda them: len(them.events) == 2)
+    assert not lock.is_held()
+    if ends == "in order":
+        first.communicate(timeout=20)
+    else:
+        first.kill()
+    assert first.wait(20) == (0 if ends == "in order" else -signal.SIGKILL)
+    ended(location, wall, plan, (3, 4))
+    heard.until(lambda them: them.events[-1]["number"] == 4)
+    heard.until(lambda them: them.retained["robots/plant/agent"]["up"])
+    heard.until(lambda them: them.retained[f"{PLAN}{plan.id}"]["states"]["kept"] == 4)
+    numbers = [event["number"] for event in heard.events]
+    # Without a gap; what the first did not note as acknowledged comes twice.
+    assert numbers[:2] == [1, 2]
+    assert numbers[2:] == list(range(numbers[2], 5))
+
+
+@NEEDED
+def test_who_loses_the_broker_lets_another_publish_and_says_once_who_does(
+    broker, feed, stack, location, wall, told, tmp_path, monkeypatch
+):
+    """Two brokers stand for one that the first agent reaches no more, and the second does."""
+    asked: list[str] = []
+    taken: list[str] = []
+    now_s = 0.0
+    time_of_the_feed = SimpleNamespace(monotonic_ns=lambda: int(now_s * 1e9))
+    monkeypatch.setattr(mqtt_feed, "runtime", time_of_the_feed)
+
+    def lock_of(name):
+        def take():
+            try:
+                AgentLock.take(lock)
+                taken.append(name)
+            finally:
+                asked.append(name)
+
+        lock = AgentLock(location, "plant", "broker")
+        monkeypatch.setattr(lock, "take", take)
+        return lock
+
+    def asks_again_at(second_s):
+        nonlocal now_s
+        before, now_s = asked.count("second"), second_s
+        eventually(lambda: asked.count("second") > before)
+
+    plan = planned(location, wall)
+    (tmp_path / "other").mkdir()
+    away = Broker(tmp_path / "other").start()
+    stack.callback(lambda: away.stop())
+    with AgentLock(location, "plant", "broker"):
+        feed(away, lock=lock_of("first"))
+        eventually(lambda: told)
+    now_s = 5.5
+    heard = listener(stack, away)
+    heard.until(lambda them: them.retained.get("robots/plant/agent", {}).get("up"))
+    second_ends = feed(broker, lock=lock_of("second"))
+    eventually(lambda: len(told) == 2)
+    asks_again_at(100.0)
+    for number in (1, 2):  # who is connected goes on for however long
+        ended(location, wall, plan, (number,))
+        heard.until(lambda them, number=number: len(them.events) == number)
+    assert taken == ["first"]
+    assert len(asked) == 4, "the lock of another agent is asked for without a pause"
+    away.stop()
+    eventually(lambda: len(told) == 3)
+    asks_again_at(159.0)
+    assert taken == ["first"]
+    now_s = 161.0  # the first gives the lock up, and the second asks for it before the first does
+    following = AgentLock(location, "plant", "broker")
+    eventually(lambda: is_free(following))
+    asks_again_at(164.5)
+    heard = listener(stack, broker)
+    heard.until(lambda them: them.retained.get("robots/plant/agent", {}).get("up"))
+    assert taken == ["first", "second"]
+    now_s = 172.0
+    eventually(lambda: len(told) == 4)
+    now_s = 178.0
+    eventually(lambda: asked[-2:] == ["first", "first"])
+    second_ends()
+    now_s = 184.0
+    eventually(lambda: taken[2:] == ["first"])
+    away.start()
+    heard = listener(stack, away)
+    heard.until(lambda them: them.retained.get("robots/plant/agent", {}).get("up"))
+    assert [sentence.count(" publishes to the broker ") for sentence in told] == [1, 1, 0, 1]
+    assert f" publishes to the broker {away.url}." in told[3]
+    assert "does not answer" in told[2]
+
+
+def is_free(lock):
+    try:
+        with lock:
+            return True
+    except LeaseHeldError:
+        return False
 
 
 @NEEDED

@@ -489,7 +489,7 @@ for cell in store.plan(plan).cells:
 def test_what_a_killed_process_was_told_is_on_record(open_store, location, wall):
     store = open_store()
     plan = permitted(store, plan_with(400, kind="check"))
-    command = [sys.executable, "-c", RECORDER, location, plan.id]
+    command = [sys.executable, "-m", "tests._program", RECORDER, location, plan.id]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         told = [process.stdout.readline().split() for _ in range(41)]
@@ -557,7 +557,7 @@ def test_a_home_that_is_frozen_in_a_transaction_holds_up_the_others_for_seconds(
             names = ("keepalives_idle", "keepalives_interval", "keepalives_count", "user_timeout")
             shown = [database.rows(f"SHOW tcp_{name}")[0][0] for name in names]
             assert shown == ["5", "2", "3", "10000"]
-        command = [sys.executable, "-c", FROZEN, url, stuck.id]
+        command = [sys.executable, "-m", "tests._program", FROZEN, url, stuck.id]
         with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
             assert process.stdout is not None
             process.stdout.readline()
@@ -631,3 +631,46 @@ def test_who_begins_takes_the_cell_before_the_events_as_who_ends(server):
             assert begins.result().why is WaitReason.WINDOW
             assert ends.result().job.state is JobState.KEPT
         assert state_of(store, night, SECOND) is JobState.MISSED
+
+
+# ---- years of ended plans
+
+
+@pytest.mark.parametrize(
+    ("statement", "values"),
+    [
+        (statements.OPEN_PLANS, {"plant": "plant", "cell": ""}),
+        (statements.OPEN_LINE_JOBS, {"line": "mes"}),
+        (statements.RECENT_PLANS, {"plant": "plant", "since": "9", "most": 20}),
+    ],
+)
+def test_what_is_open_is_found_without_a_look_at_what_has_ended(store, location, statement, values):
+    server = "://" in location
+    numbers = [{"n": n, "plan": f"p{n:05d}", "at": f"2026-{n:05d}"} for n in range(3000)]
+    with store._database.transaction() as database:
+        database.run_many(
+            "INSERT INTO plans (plan, plant, made_at, document, cancelled_at) "
+            "VALUES (:plan, 'plant', :at, '{}', '')",
+            numbers,
+        )
+        database.run_many(
+            "INSERT INTO outcomes (plan, cell, ring, place, state, attempt, begun_at, ended_at, "
+            "code, error, reason, what, change, treatment, judged, corrections, sequence) VALUES "
+            "(:plan, 'a', 0, :n, 'kept', 1, '', '', 0, '', '', '', '', '', 0, '', 1)",
+            numbers,
+        )
+        database.run_many(
+            "INSERT INTO line_jobs (line, order_id, plan, cell, posted_at, body) "
+            "VALUES ('mes', :plan, :plan, 'a', '', '{}')",
+            numbers,
+        )
+        if server:
+            for table in ("plans", "outcomes", "line_jobs"):
+                database.run(f"ANALYZE {table}")
+    with store._database.transaction() as database:
+        ask = "EXPLAIN " if server else "EXPLAIN QUERY PLAN "
+        steps = [str(row[-1]) for row in database.rows(ask + statement, values)]
+    whole = ("Seq Scan on",) if server else ("SCAN plans", "SCAN outcomes", "SCAN line_jobs")
+    by_plant = "SEARCH plans USING INDEX plans_by_time (plant=?)"
+    assert steps
+    assert [step for step in steps if step.strip("- >").startswith((*whole, by_plant))] == []

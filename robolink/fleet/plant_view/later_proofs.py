@@ -1,8 +1,9 @@
 """Values that were written without motion, and the later turn test that confirms one of them.
 
 Such a value counts as proved only if the record of that controller shows, after it was written, a
-turn test of the same tool that passed, in a change that ended with the very same value in it; and
-if nothing on record between the two put another value into that tool.
+turn test of the same tool that passed while the tool held the very same value, in a change that
+ended with it. Another value in between proves nothing and spoils nothing: once the tool holds the
+first one again, a test counts.
 """
 
 from collections.abc import Iterable, Iterator
@@ -36,8 +37,7 @@ def proof_of(entries: Iterable[Recorded], order: str) -> int | None:
         order: Id of the order, which wrote without motion.
 
     Returns:
-        Number of the test's entry; ``None`` where no test has confirmed it yet, or another value
-        came into one of its tools since.
+        Number of the test's entry; ``None`` where no test has confirmed it yet.
 
     Example:
         >>> from robolink.fleet import proof_of
@@ -46,6 +46,7 @@ def proof_of(entries: Iterable[Recorded], order: str) -> int | None:
     """
     written: dict[int, list[object]] = {}
     tested: dict[tuple[str, int], int] = {}
+    others: set[tuple[str, int]] = set()
     proofs: dict[int, int] = {}
     for entry in entries:
         if not written:
@@ -59,13 +60,18 @@ def proof_of(entries: Iterable[Recorded], order: str) -> int | None:
         if entry.kind is EntryKind.VERIFY:
             # The last test of a change counts: one that was made again may fail.
             tested.pop(key, None)
-            if entry.details.get("passed") is True and _is_settled(entry):
+            passed = entry.details.get("passed") is True and _is_settled(entry)
+            if passed and key not in others:
                 tested[key] = entry.number
             continue
         # What a later change found there may have come from a pendant.
         shown = "before" if entry.kind is EntryKind.INTENT else "value"
         if shown in entry.details and entry.details[shown] != written[tool]:
-            return None
+            others.add(key)
+            tested = {one: number for one, number in tested.items() if one[1] != tool}
+            continue
+        if shown in entry.details:
+            others.discard(key)
         if entry.kind in KEPT and "value" in entry.details and entry.change and key in tested:
             proofs[tool] = tested[key]
             if len(proofs) == len(written):

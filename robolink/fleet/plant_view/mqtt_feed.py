@@ -4,6 +4,10 @@ Nothing comes in: the client subscribes to nothing, and what a broker sends all 
 States are published again after each connecting. Events come from the plant's database, and the
 last one that the broker has acknowledged is noted there: so each is delivered at least once and in
 order, however often broker, agent or database end in between.
+
+Of the agents of a plant that publish to the same topics, one does so at a time: who has the lock.
+The others are not connected to the broker, lest the last will of one says that the other is gone.
+Whoever has the lock and no connection to the broker gives the lock up: another may reach it.
 """
 
 import json
@@ -15,9 +19,11 @@ from typing import TYPE_CHECKING, Final
 from urllib.parse import quote, urlsplit
 
 from robolink import runtime
-from robolink.errors import ConfigError, RobolinkError
+from robolink.errors import ConfigError, LeaseHeldError, RobolinkError
+from robolink.fleet.agent_lock import AgentLock
 from robolink.fleet.plant_view.notes import PlanSummary, PlantLook, PlantNotes
 from robolink.fleet.states import JobState
+from robolink.journal._places import place_of
 from robolink.messages import tr
 from robolink.model import Secret
 from robolink.plug_ins import unexpected
@@ -35,6 +41,16 @@ ACK_S: Final = 5.0
 
 AT_ONCE: Final = 100
 """Most messages that are not acknowledged yet."""
+
+_KEEP_ALIVE_S: Final = 30
+"""Longest silence of a connection, s; after 1.5 times as long the broker says that it is gone."""
+
+AWAY_S: Final = 2.0 * _KEEP_ALIVE_S
+"""How long who has the lock tries a broker that it is not connected to, s: until its last will
+has been said, so that this does not follow what the next one says."""
+
+WAIT_S: Final = 5.0
+"""Pause before the lock that another agent has is asked for again, s."""
 
 _RETRY_S: Final = (1, 60)
 """Shortest and longest pause before the broker is tried again, s."""
@@ -114,6 +130,22 @@ def broker_of(url: str, *, plain_host: str = "") -> MqttBroker:
     )
 
 
+def publisher_lock(location: str, plant: str, broker: MqttBroker) -> AgentLock | None:
+    """Return the lock of who publishes to a broker; ``None`` in a file, which has one agent.
+
+    Args:
+        location: The plant's database: path of a file, or URL of PostgreSQL.
+        plant: Id of the plant.
+        broker: The broker.
+
+    Raises:
+        JournalError: The location is none.
+    """
+    if place_of(location).path is not None:
+        return None
+    return AgentLock(location, plant, _name_of(broker))
+
+
 class MqttFeed:
     """Publishes the states and events of a plant to a broker.
 
@@ -122,6 +154,7 @@ class MqttFeed:
         notes: The plant's database, with a connection that nobody else uses.
         plant: Id of the plant.
         password: Of the broker's user.
+        lock: Whoever publishes has it; without one, nobody else does.
         tell: Receives sentences for people, each trouble once.
     """
 
@@ -132,12 +165,14 @@ class MqttFeed:
         plant: str,
         *,
         password: Secret | None = None,
+        lock: AgentLock | None = None,
         tell: Callable[[str], None] = lambda _sentence: None,
     ) -> None:
-        self._broker, self._notes, self._tell = broker, notes, tell
+        self._broker, self._notes, self._lock, self._tell = broker, notes, lock, tell
         self._plant = plant
         self._root = f"{broker.prefix}/{_level(plant)}"
-        self._position = f"mqtt {broker.host}:{broker.port}/{broker.prefix}"
+        self._position = _name_of(broker)
+        self._begun = False
         self._published: dict[str, str] = {}
         self._pending: list[MQTTMessageInfo] = []
         self._acknowledged: Callable[[], None] = lambda: None
@@ -145,14 +180,14 @@ class MqttFeed:
         self._lost = threading.Event()
         self._ending = threading.Event()
         self._trouble = ""
+        self._publisher = ""
+        self._heard_s = self._asks_s = 0.0
+        self._password = password
         self._client = self._made(password)
 
     @contextmanager
     def running(self) -> Iterator[None]:
         """Publish while the block runs; at its end the broker is told that the agent is gone."""
-        client = self._client
-        client.connect_async(self._broker.host, self._broker.port, keepalive=30)
-        client.loop_start()
         thread = threading.Thread(target=self._run, name="messages of the plant", daemon=True)
         thread.start()
         try:
@@ -160,21 +195,82 @@ class MqttFeed:
         finally:
             self._ending.set()
             thread.join(_END_S)  # one that waits for a database that hangs ends with the process
-            if self._connected.is_set():
-                with suppress(ValueError, RuntimeError):
-                    said = client.publish(self._agent_topic, self._agent(up=False), 1, retain=True)
-                    said.wait_for_publish(_END_S)
-            client.disconnect()
-            client.loop_stop()
+            self._leave(says_so=True)
 
     def _run(self) -> None:
         while not self._ending.wait(EVERY_S):
             try:
-                self.step()
+                if self._has_turn():
+                    self.step()
             except RobolinkError as error:
                 self._say(str(error))
             except Exception as error:  # a defect is told, too, and ends no later step
                 self._say(unexpected(error))
+
+    def _has_turn(self) -> bool:
+        """Whether this feed publishes; it is connected as long as it does.
+
+        Raises:
+            PlantError: The database cannot be used. Whose turn it is shows when it answers.
+        """
+        now_s = runtime.monotonic_ns() / 1e9
+        if self._connected.is_set():
+            self._heard_s = now_s
+        elif self._begun and self._lock is not None and now_s > self._heard_s + AWAY_S:
+            self._leave(says_so=False)
+            self._asks_s = now_s + 2 * WAIT_S  # whoever waits asks before
+        if self._lock is not None and not self._lock.is_held():
+            if now_s < self._asks_s:
+                return False
+            try:
+                self._lock.take()
+            except LeaseHeldError as error:
+                self._leave(says_so=False)
+                self._asks_s = now_s + WAIT_S
+                self._wait_for(error.holder)
+                return False
+        if not self._begun:
+            self._begun, self._heard_s = True, now_s
+            self._client.connect_async(
+                self._broker.host, self._broker.port, keepalive=_KEEP_ALIVE_S
+            )
+            self._client.loop_start()
+        return True
+
+    def _wait_for(self, publisher: str) -> None:
+        """Tell who publishes, once."""
+        if publisher != self._publisher:
+            self._tell(
+                tr(
+                    "{who} publishes to the broker {url}. This agent takes over when that one "
+                    "ends, or has no connection to the broker for {seconds} s.",
+                    who=publisher,
+                    url=self._broker.url,
+                    seconds=f"{AWAY_S:.0f}",
+                )
+            )
+        self._publisher = publisher
+
+    def _leave(self, *, says_so: bool) -> None:
+        """Disconnect from the broker; what it has not acknowledged is read anew, here or elsewhere.
+
+        Args:
+            says_so: Whether nobody else publishes, so that it is told that the agent is gone.
+        """
+        if not self._begun:
+            return
+        client = self._client
+        if self._connected.is_set() and says_so:
+            with suppress(ValueError, RuntimeError):
+                said = client.publish(self._agent_topic, self._agent(up=False), 1, retain=True)
+                said.wait_for_publish(_END_S)
+        client.disconnect()
+        client.loop_stop()
+        self._connected.clear()
+        self._begun, self._client = False, self._made(self._password)
+        self._pending, self._acknowledged = [], lambda: None
+        if self._lock is not None:
+            self._lock.release()
 
     def step(self) -> None:
         """Publish what is new, as far as the broker takes it.
@@ -315,12 +411,19 @@ class MqttFeed:
         if code.is_failure:
             self._say(tr("The broker {url} refuses: {why}.", url=self._broker.url, why=code))
             return
-        self._trouble = ""
+        self._trouble = self._publisher = ""
         self._lost.set()
         self._connected.set()
 
     def _on_connect_fail(self, _client: object, _data: object) -> None:
-        self._say(tr("The broker {url} does not answer; it is tried again.", url=self._broker.url))
+        silent = tr("The broker {url} does not answer; it is tried again.", url=self._broker.url)
+        if self._broker.secure:  # the client does not say which of the two it was
+            silent = tr(
+                "The broker {url} does not answer, or its certificate is not valid for this "
+                "computer; it is tried again.",
+                url=self._broker.url,
+            )
+        self._say(silent)
 
     def _on_disconnect(self, *_: object) -> None:
         self._connected.clear()
@@ -350,6 +453,11 @@ def _plan(plan: PlanSummary) -> Mapping[str, object]:
             for halt in plan.standing
         ],
     }
+
+
+def _name_of(broker: MqttBroker) -> str:
+    """Return what the position of a broker, and the lock of who publishes there, is called."""
+    return f"mqtt {broker.host}:{broker.port}/{broker.prefix}"
 
 
 def _level(name: str) -> str:

@@ -1,6 +1,6 @@
 """One plan inside a transaction: what holds it back, how its jobs end, and when it halts."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from datetime import datetime
 
 from robolink.errors import BusyError
@@ -26,7 +26,12 @@ from robolink.fleet.progress import (
 )
 from robolink.fleet.states import JobState, PlanKind
 from robolink.fleet.store import statements
-from robolink.fleet.store.homes import cells_away, homes_of_plan
+from robolink.fleet.store.homes import (
+    cells_away,
+    claimants,
+    homes_of_plan,
+    require_all_cells,
+)
 from robolink.fleet.store.rows import (
     accepted_in,
     evidence_in,
@@ -94,15 +99,24 @@ class PlanCourse:
             computer: Name of the computer.
         """
         home = self.plan.homes.get(cell) or self.bound_to
-        return not home or computer_key(home) == computer_key(computer)
+        if home:
+            return computer_key(home) == computer_key(computer)
+        able = claimants(self._database, self.plan)
+        return not able or computer_key(computer) in able
 
-    def bind(self, computer: str) -> None:
+    def bind(self, computer: str, cells: Collection[str] | None = None) -> None:
         """Have a plan whose cells name no home carried out by one computer, the first that begins.
 
         Args:
             computer: Its name.
+            cells: Names of its cells, of which the plan may have no others; any unless given.
+
+        Raises:
+            PlanError: The plan has others.
         """
         if not (self.plan.homes or self.bound_to):
+            if cells is not None:
+                require_all_cells(self.plan, cells)
             self._database.run(statements.BIND_PLAN, {"plan": self.plan.id, "home": computer})
 
     def require_begun(self, job: CellJob, attempt: int) -> None:
@@ -422,7 +436,8 @@ def progress_in(database: DatabaseConnection, plan: str, now: datetime) -> PlanP
     busy = frozenset(cell for cell, order in at_work if order != found.order(cell))
     homes = homes_of_plan(database, found, bound_to)
     facts = PlanCourse(database, found, now).facts(busy, cells_away(found, homes, now))
-    return PlanProgress(found, jobs, halts, facts, cancelled_at, bound_to, homes)
+    able = frozenset() if found.homes or bound_to else claimants(database, found)
+    return PlanProgress(found, jobs, halts, facts, cancelled_at, bound_to, homes, able)
 
 
 def added_plan(

@@ -1,6 +1,6 @@
 """The homes of a plant inside a transaction: when the agent of each was heard last."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from datetime import datetime
 
 from robolink.fleet.errors import PlanError
@@ -56,6 +56,45 @@ def homes_of_plan(database: DatabaseConnection, plan: Plan, bound_to: str) -> di
     heard = {computer_key(one.home): one for one in homes_in(database, plan.plant)}
     keys = {computer_key(name): name for name in names}
     return {key: heard.get(key, PlantHome(plan.plant, name)) for key, name in keys.items()}
+
+
+def claimants(database: DatabaseConnection, plan: Plan) -> frozenset[str]:
+    """Return the keys of the computers one of which carries out a plan whose cells name no home.
+
+    Args:
+        database: The connection, within a transaction.
+        plan: The plan.
+
+    Returns:
+        Those whose agents were ever heard in its plant; empty where it may be any computer, and
+        for a file, which only one has.
+    """
+    if not database.has_schemas:
+        return frozenset()
+    return frozenset(computer_key(one.home) for one in homes_in(database, plan.plant))
+
+
+def require_all_cells(plan: Plan, cells: Collection[str]) -> None:
+    """Refuse that a computer makes a plan its own whose cells it has not all.
+
+    Args:
+        plan: The plan.
+        cells: Names of the computer's cells.
+
+    Raises:
+        PlanError: Some are missing.
+    """
+    missing = sorted({*plan.cells} - {*cells})
+    if missing:
+        raise PlanError(
+            tr(
+                "Plan {plan} waits for a computer that has all of its cells; this one has no "
+                "{cells}.",
+                plan=plan.id,
+                cells=", ".join(missing[:3]),
+            ),
+            remedy=tr("Name the home of each cell in the cell files, then make the plan anew."),
+        )
 
 
 def cells_away(plan: Plan, homes: Mapping[str, PlantHome], now: datetime) -> frozenset[str]:

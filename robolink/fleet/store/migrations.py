@@ -111,11 +111,25 @@ def _homes(connection: DatabaseConnection) -> None:
     _run(connection, _HOMES)
 
 
+_WHAT_IS_OPEN: Final = """
+    CREATE INDEX outcomes_open ON outcomes (state, plan, cell)
+        WHERE state IN ('waiting', 'running');
+    CREATE INDEX plans_by_time ON plans (plant, made_at DESC, plan);
+    CREATE INDEX line_jobs_by_plan ON line_jobs (plan)
+"""
+"""An agent asks every second what is open: years of ended plans must not slow that down."""
+
+
+def _what_is_open(connection: DatabaseConnection) -> None:
+    _run(connection, _WHAT_IS_OPEN)
+
+
 MIGRATIONS: tuple[Callable[[DatabaseConnection], None], ...] = (
     _first_tables,
     _what_a_plant_sees,
     _homes,
     _line_jobs,
+    _what_is_open,
 )
 
 

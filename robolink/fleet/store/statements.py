@@ -3,6 +3,8 @@
 from typing import Final
 
 _UNLESS_THERE: Final = "ON CONFLICT DO NOTHING"
+_OPEN: Final = "state IN ('waiting', 'running')"
+"""In these words both databases know that the index of what is open serves."""
 
 VERSION: Final = "SELECT version FROM fleet_version"
 SET_VERSION: Final = "UPDATE fleet_version SET version = :own"
@@ -40,16 +42,16 @@ ADD_PLAN: Final = (
 PLAN: Final = "SELECT document, cancelled_at, home FROM plans WHERE plan = :plan"
 PLANS: Final = "SELECT document, cancelled_at FROM plans ORDER BY made_at DESC, plan"
 RECENT_PLANS: Final = (
-    "SELECT document, cancelled_at FROM plans WHERE plant = :plant AND (made_at >= :since OR plan "
-    "IN (SELECT plan FROM plans WHERE plant = :plant ORDER BY made_at DESC, plan LIMIT :most) OR "
-    "EXISTS (SELECT 1 FROM outcomes WHERE outcomes.plan = plans.plan AND state IN "
-    "('waiting', 'running'))) ORDER BY made_at DESC, plan"
+    "SELECT document, cancelled_at FROM plans WHERE :plant IN ('', plant) AND plan IN ("
+    "SELECT plan FROM plans WHERE plant = :plant AND made_at >= :since UNION "
+    "SELECT plan FROM (SELECT plan FROM plans WHERE plant = :plant "
+    "ORDER BY made_at DESC, plan LIMIT :most) AS newest UNION "
+    f"SELECT plan FROM outcomes WHERE {_OPEN}) ORDER BY made_at DESC, plan"
 )
 NEWEST_PLANS: Final = f"{PLANS} LIMIT :most"
 OPEN_PLANS: Final = (
-    "SELECT plan FROM plans WHERE :plant IN ('', plant) AND EXISTS (SELECT 1 FROM outcomes "
-    "WHERE outcomes.plan = plans.plan AND :cell IN ('', cell) "
-    "AND state IN ('waiting', 'running')) ORDER BY made_at, plan"
+    "SELECT plan FROM plans WHERE :plant IN ('', plant) AND plan IN (SELECT plan FROM outcomes "
+    f"WHERE {_OPEN} AND :cell IN ('', cell)) ORDER BY made_at, plan"
 )
 LOCK_PLAN: Final = "SELECT cancelled_at, home FROM plans WHERE plan = :plan"
 BIND_PLAN: Final = "UPDATE plans SET home = :home WHERE plan = :plan AND home = ''"
@@ -169,8 +171,8 @@ ADD_LINE_JOB: Final = (
     f"VALUES (:line, :order_id, :plan, :cell, :at, :body) {_UNLESS_THERE}"
 )
 OPEN_LINE_JOBS: Final = (
-    "SELECT count(*) FROM line_jobs WHERE line = :line AND EXISTS (SELECT 1 FROM outcomes WHERE "
-    "outcomes.plan = line_jobs.plan AND state IN ('waiting', 'running'))"
+    "SELECT count(*) FROM line_jobs WHERE line = :line AND plan IN "
+    f"(SELECT plan FROM outcomes WHERE {_OPEN})"
 )
 LINE_JOB: Final = f"{_LINE_JOBS} AND line = :line"
 LINE_JOBS: Final = f"{_LINE_JOBS} ORDER BY posted_at, line"

@@ -5,7 +5,7 @@ lock of that plan first, then that of the cell, so that two agents, or two worke
 each other's outcomes: a rule is checked in the transaction of the outcome that breaks it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from datetime import datetime
 
@@ -217,7 +217,7 @@ class FleetStore(ClosedAtExit):
             self._course(database, plan).miss()
         return self.progress(plan)
 
-    def begin(self, plan: str, cell: str) -> Turn:
+    def begin(self, plan: str, cell: str, *, cells: Collection[str] | None = None) -> Turn:
         """Begin a job if it is its turn; the one gate that every delivery of it passes.
 
         A job that was begun and has not ended is handed out again, as the same attempt: its order
@@ -225,8 +225,25 @@ class FleetStore(ClosedAtExit):
         if :attr:`Turn.may_write` says so. One that has ended is not begun again. On another
         computer than the home of the cell none is begun, and none handed out.
 
+        Args:
+            plan: Id of the plan.
+            cell: Name of the cell.
+            cells: Names of this computer's cells: where no cell names a home, it makes a plan its
+                own only if it has all of them. Not asked unless given.
+
+        Example:
+            >>> from robolink.fleet import FleetStore, plan_of
+            >>> table = {"schema": "robolink/fleet-plan/1", "kind": "check", "name": "n"}
+            >>> plan = plan_of({**table, "cells": ["a", "b"]}, cells=["a", "b"])
+            >>> store = FleetStore("begin.db")
+            >>> store.add_plan(plan)
+            >>> str(store.begin(plan.id, "a", cells=["a", "b"]).job.state)
+            'running'
+            >>> store.close()
+
         Raises:
-            PlanError: There is no such plan, or it has no such cell.
+            PlanError: There is no such plan, or it has no such cell; or this computer would make a
+                plan its own whose cells it has not all.
             PlantError: The database cannot be used; the job was not begun.
         """
         with self._database.transaction() as database:
@@ -248,7 +265,7 @@ class FleetStore(ClosedAtExit):
                 return Turn(job, why)
             database.run(statements.SET_AT_WORK, {**where, "order_id": course.plan.order(cell)})
             if self._database.shared:
-                course.bind(self.home)
+                course.bind(self.home, cells)
             database.run(statements.BEGIN_JOB, {"plan": plan, "cell": cell, "at": course.label})
             return Turn(course.job(cell))
 

@@ -1,6 +1,7 @@
 """A temporary PostgreSQL server on loopback for the tests."""
 
 import os
+import secrets
 import shutil
 import signal
 import socket
@@ -8,7 +9,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,7 @@ class Server:
     def empty_place(self) -> str:
         """Return the URL of an empty journal in a schema of its own."""
         name = f"j{uuid4().hex}"
-        self.execute(f"CREATE SCHEMA {name}")
+        asked(self.url(), f"CREATE SCHEMA {name}")
         return f"{self.url()}?options=-csearch_path%3D{name}"
 
     def empty_database(self) -> str:
@@ -79,12 +80,14 @@ class Server:
     def stop(self) -> None:
         """Stop the server at once, as an administrator's fast shutdown does."""
         assert self.process is not None
+        _hang_up()
         self.process.send_signal(2)
         self.process.wait(timeout=_START_S)
 
     def crash(self) -> None:
         """End it at once, so that it recovers at its next start."""
         assert self.process is not None
+        _hang_up()
         self.process.send_signal(signal.SIGQUIT)
         self.process.wait(timeout=_START_S)
 
@@ -111,6 +114,12 @@ def asked(url: str, query: str) -> list[tuple[Any, ...]]:
         _connections[url] = known
     found = known.execute(query.encode())
     return found.fetchall() if found.description else []
+
+
+def _hang_up() -> None:
+    """Close these connections: their server is about to end."""
+    while _connections:
+        _connections.popitem()[1].close()
 
 
 @contextmanager
@@ -156,6 +165,9 @@ def _run_as_nobody(command: list[str], output: int) -> subprocess.Popen[bytes]:
 
 
 def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Return a port below those that a system hands out: nobody takes that of a stopped server."""
+    while True:
+        port = secrets.choice(range(10_000, 20_000))
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port

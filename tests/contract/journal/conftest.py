@@ -8,18 +8,9 @@ import pytest
 from robolink.journal._journal import Journal
 from robolink.journal._places import place_of
 from robolink.journal.store.store import Store
-from tests.contract.journal._postgresql import Server, asked, is_installed, served
+from tests.contract.journal._postgresql import Server, asked
 
 Opener = Callable[..., Journal]
-
-
-@pytest.fixture(scope="session")
-def server() -> Iterator[Server]:
-    """A PostgreSQL server."""
-    if not is_installed():
-        pytest.skip("PostgreSQL is not installed here: initdb and postgres are missing")
-    with served() as server:
-        yield server
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])

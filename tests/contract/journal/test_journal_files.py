@@ -195,7 +195,7 @@ def test_nothing_is_sent_when_the_intent_finds_no_space(filled):
             print(error)
     """
     shown = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(program), str(filled)],
+        [sys.executable, "-m", "tests._program", textwrap.dedent(program), str(filled)],
         cwd=ROOT,
         capture_output=True,
         text=True,

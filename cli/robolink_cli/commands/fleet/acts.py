@@ -168,6 +168,7 @@ class CellActs(ClosedAtExit):
         self._reading = threading.Lock()
         self._files: CellFiles | None = None
         self._lines: dict[str, _Line] = {}
+        self._tell, self._told = tell, set[str]()
         self._as_of: tuple[tuple[int, int], ...] | None = None
         self._kinds: Final[Mapping[PlanKind, Callable[[_Job], JobOutcome]]] = {
             PlanKind.BACKUP: self._back_up,
@@ -187,12 +188,23 @@ class CellActs(ClosedAtExit):
         try:
             found, keep_days = self._cell(cell)
             found.home.require_here()
+            self._say_how_protected(found)
             job = _Job(plan, found, permit, keep_days, line, self._listener)
             return self._kinds[plan.kind](job)
         except Exception as error:  # a defect is told, too, and ends one job
             return outcome_of(error)
         finally:
             del self._lines[plan.order(cell)]
+
+    def _say_how_protected(self, cell: "Cell") -> None:
+        """Say, once a cell, where its connection is less protected than it could be."""
+        if "+opcua://" in cell.url and cell.url not in self._told:
+            from robolink.transport import parse_url
+            from robolink.transport.opcua.security import protection_remark
+
+            self._told.add(cell.url)
+            if remark := protection_remark(parse_url(cell.url)):
+                self._tell(f"{cell.name}: {remark}")
 
     def exchanges(self, order: str) -> int:
         """Return how many requests a job has sent; see :class:`robolink.fleet.silence.CellLine`."""

@@ -175,7 +175,7 @@ def _published_to(url: str | None, plant: str, plain_host: str) -> Iterator[str 
         )
     from robolink.config.passwords import from_keyring, from_places
     from robolink.fleet import PlantNotes, default_plant
-    from robolink.fleet.plant_view.mqtt_feed import MqttFeed, broker_of
+    from robolink.fleet.plant_view.mqtt_feed import MqttFeed, broker_of, publisher_lock
 
     broker = broker_of(url, plain_host=plain_host)
     password = None
@@ -184,7 +184,8 @@ def _published_to(url: str | None, plant: str, plain_host: str) -> Iterator[str 
             os.environ.get(_MQTT_PASSWORD_FILE), "ROBOLINK_MQTT_PASSWORD"
         )
     notes = PlantNotes(default_plant(), plant)  # never closed: that would wait for a look
-    with MqttFeed(broker, notes, plant, password=password, tell=note).running():
+    lock = publisher_lock(default_plant(), plant, broker)
+    with MqttFeed(broker, notes, plant, password=password, lock=lock, tell=note).running():
         yield broker.url
 
 

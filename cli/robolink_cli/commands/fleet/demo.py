@@ -1,7 +1,8 @@
 """fleet demo: a plan for twenty simulated cells, while its agent is killed twice."""
 
 import tempfile
-from collections.abc import Iterator, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -27,8 +28,11 @@ CELLS: Final = 20
 X_MM: Final = 12.7
 """What is written into X: 0.2 mm from what each cell holds."""
 
-_KILLED_AT: Final = (7, 13)
-"""After how many written cells the agent is killed: in the midst of the last ring."""
+KILLED_AT: Final = (7, 13)
+"""At which writes of a controller the agent is killed: in the midst of the last ring."""
+
+_AT_ONCE: Final = 4
+"""Cells at work at once: of those that one agent has begun, enough are left for the next."""
 
 
 @click.command("demo", short_help="A plan for twenty simulated cells; its agent is killed twice.")
@@ -44,34 +48,83 @@ def demo(
     """
     require_packages()
     with tempfile.TemporaryDirectory(prefix="robolink-fleet-") as name, ExitStack() as stack:
-        simulators = stack.enter_context(served_cells(seed))
+        killer = _Killer()
+        simulators = stack.enter_context(served_cells(seed, killer.count_write))
         urls = {cell: simulator.url for cell, simulator in simulators.items()}
         if not json_is_on():
             say(tr("SIMULATED: {count} EPSON cells, served here. Nothing moves.", count=CELLS))
-        rollout = Rollout(Path(name), urls, X_MM, tell=say)
-        plan, kills = rollout.make(), list(_KILLED_AT)
-
-        def kill_now(progress: "PlanProgress") -> bool:
-            over = sum(job.state.final for job in progress.jobs)
-            if not kills or over < kills[0]:
-                return False
-            kills.pop(0)
-            say(tr("The agent was killed (SIGKILL) after {count} cells.", count=over))
-            return True
-
-        progress = rollout.carry_out(plan, kill_now)
+        rollout = Rollout(Path(name), urls, X_MM, at_once=_AT_ONCE, tell=say)
+        killer.rollout = rollout
+        progress = rollout.carry_out(rollout.make(), killer.tell)
         payload = _payload(progress, rollout, simulators)
     emit("fleet-demo", payload, lambda: _show(progress, payload))
     require_right(payload)
 
 
+class _Killer:
+    """Kills the agent of a rollout at some writes, where they are executed.
+
+    Whoever only looks at the plan now and then may see it when all of it is over.
+    """
+
+    rollout: Rollout
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._writes, self._left = 0, list(KILLED_AT)
+        self._told: list[int] = []
+
+    def count_write(self) -> None:
+        """Count a write of a controller; kill the agent that lives if it is the moment."""
+        with self._lock:
+            self._writes += 1
+            agent, dead = self.rollout.agent, len(KILLED_AT) - len(self._left)
+            # Writes that a killed agent had sent come later, too.
+            if agent is None or dead > self.rollout.count.kills:
+                return
+            if self._left and self._writes >= self._left[0]:
+                self._left.pop(0)
+                agent.kill()
+                self._told.append(self._writes)
+
+    def tell(self, _progress: "PlanProgress") -> bool:
+        """Say which kills came since; there is nothing else to do."""
+        with self._lock:
+            told, self._told = self._told, []
+        for count in told:
+            say(tr("The agent was killed (SIGKILL) at the write of cell {count}.", count=count))
+        return False
+
+
+class _CountedCell(EpsonSimulator):
+    """A controller that tells of each write."""
+
+    def __init__(self, robot: str, seed: int, wrote: Callable[[], None]) -> None:
+        super().__init__(robot, seed=seed)
+        self._wrote, self._told_writes = wrote, 0
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach an instant, and tell of what was written by then."""
+        super().advance(now_ns)
+        while self._told_writes < self.machine.flash_writes:
+            self._told_writes += 1
+            self._wrote()
+
+
 @contextmanager
-def served_cells(seed: int) -> Iterator[Mapping[str, EpsonSimulator]]:
-    """Serve simulated controllers over TCP on this computer, by the names of their cells."""
+def served_cells(
+    seed: int, wrote: Callable[[], None] = lambda: None
+) -> Iterator[Mapping[str, EpsonSimulator]]:
+    """Serve simulated controllers over TCP on this computer, by the names of their cells.
+
+    Args:
+        seed: Of the first of them.
+        wrote: Called at each write, in a thread of its controller.
+    """
     with ExitStack() as stack:
         simulators = {}
         for number in range(1, CELLS + 1):
-            simulator = EpsonSimulator("T6-602S", seed=seed + number)
+            simulator = _CountedCell("T6-602S", seed + number, wrote)
             stack.enter_context(serve_tcp(simulator, clock=ScaledClock()))
             simulators[f"cell-{number:02d}"] = simulator
         yield simulators

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from robolink.config import load_cell_files
 from robolink.errors import BusyError, OutcomeUnknownError, RobolinkError
 from robolink.fleet import (
     CellJob,
@@ -116,6 +117,7 @@ class JobGate:
 
         Raises:
             BusyError: It is not its turn any more.
+            PlanError: No home is named, and this computer has not all cells of the plan.
             PlantError: The database cannot be used; nothing was begun.
         """
         planned, plan = self._planned, self._planned.plan
@@ -136,7 +138,8 @@ class JobGate:
         )
 
     def _take_turn(self) -> None:
-        turn = self._store.begin(self._planned.plan.id, self._planned.job.cell)
+        planned, cells = self._planned, load_cell_files().cells
+        turn = self._store.begin(planned.plan.id, planned.job.cell, cells=cells)
         if turn.why is not None:
             raise self._held_back(wait_in_words(turn.why))
         if not turn.begun:

@@ -12,7 +12,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from robolink.errors import ConfigError
+from robolink.errors import BusyError, ConfigError, LeaseHeldError
 from robolink.fleet import FleetStore, HaltRule, JobState, Permit, Plan, PlanProgress, plan_of
 from robolink.fleet.errors import PlantError
 from robolink.fleet.plans import SCHEMA
@@ -60,6 +60,7 @@ class Rollout:
         urls: Of the cells, by name.
         x_mm: What is written.
         rings: Of the plan.
+        at_once: Of the plan.
         database: The plant's database; a file in the folder unless given.
         program: The words that start ``robolink``, of the n-th agent from 0 on.
         tell: Receives sentences for people.
@@ -71,6 +72,7 @@ class Rollout:
 
     Attributes:
         agent: The process that carries the plan out now.
+        journal: File of the cells' record.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class Rollout:
         x_mm: float,
         *,
         rings: Sequence[int | str] = (1, 4, "rest"),
+        at_once: int = 20,
         database: str = "",
         program: Callable[[int], Sequence[str]] = lambda _life: (
             sys.executable,
@@ -95,7 +98,9 @@ class Rollout:
     ) -> None:
         self._folder, self._urls, self._x_mm, self._tell = folder, urls, x_mm, tell
         self._rings, self._program, self._lives = list(rings), program, 0
+        self._at_once = at_once
         self.database = database or str(folder / "fleet.db")
+        self.journal = folder / "state" / "journal.db"
         self.count = RolloutCount()
         self.agent: subprocess.Popen[bytes] | None = None
         self._window, self._restarts, self._longest_s = window, restarts, longest_s
@@ -114,6 +119,7 @@ class Rollout:
             "plant": PLANT,
             "cells": list(self._urls),
             "rings": self._rings,
+            "at_once": self._at_once,
             "offsets": {name: {"tool": TOOL, "x_mm": self._x_mm} for name in self._urls},
         }
         if self._window:
@@ -232,8 +238,8 @@ class Rollout:
                 listed(tr("The plan is halted: {rules}.", rules=", ".join(sorted(rules))), said)
             )
         unsettled = [job.cell for job in progress.jobs if job.state is JobState.UNSETTLED]
-        for cell in unsettled:
-            self._recover(cell)
+        for cell in unsettled:  # one that was cut off may have its cell for a while still
+            _answered(lambda: self._recover(cell), self._longest_s)  # noqa: B023 - called at once
         self.count.recovered += unsettled
         self.count.pauses += HaltRule.PAUSE in rules
         reason = tr("recovered: {cells}", cells=", ".join(unsettled)) if unsettled else tr("looked")
@@ -246,6 +252,8 @@ class Rollout:
         from robolink.transaction import recover
 
         with robolink.connect(self._urls[cell], outcomes=self._record(cell)) as controller:
+            if controller.status().needs_reset:  # its client was silent for too long
+                controller.reset_fault()
             left = recover(controller).left
         if left:
             raise ConfigError(
@@ -258,18 +266,18 @@ class Rollout:
         from robolink.journal import open_journal, signature_here
         from robolink.transport import parse_url
 
-        journal = open_journal(str(self._folder / "state" / "journal.db"))
+        journal = open_journal(str(self.journal))
         address = parse_url(self._urls[cell]).address
         return journal.log(address, signature=signature_here(__version__))
 
 
 def _answered(ask: Callable[[], T], longest_s: float) -> T:
-    """Ask the plant's database until it answers, as a person would."""
+    """Ask the plant's database, or a cell, until it answers, as a person would."""
     until = time.monotonic() + longest_s
     while True:
         try:
             return ask()
-        except PlantError:
+        except (PlantError, LeaseHeldError, BusyError):
             if time.monotonic() > until:
                 raise
             time.sleep(0.5)

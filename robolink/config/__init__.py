@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from robolink.config._journals import use_journals_of_files as use_journals_of_files
     from robolink.config._new_cells import add_cell as add_cell
     from robolink.config._new_cells import content_with_cell as content_with_cell
+    from robolink.config._new_cells import set_cell_key as set_cell_key
     from robolink.config._plant import NamedPlant as NamedPlant
     from robolink.config._plant import named_plant as named_plant
     from robolink.config._reach import Expected as Expected
@@ -56,7 +57,7 @@ else:
             "_connecting": "connect_cell require_expected_robot",
             "_files": "ConfigFile Source config_files",
             "_journals": "lines_naming_journal use_journals_of use_journals_of_files",
-            "_new_cells": "add_cell content_with_cell",
+            "_new_cells": "add_cell content_with_cell set_cell_key",
             "_plant": "NamedPlant named_plant",
             "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
             "_selection": "GROUP_MARK names_meant",

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from robolink.config._files import CELL_FILE, config_files, read_document, whole_place
-from robolink.config._reach import Expected
+from robolink.config._reach import OPCUA_KEYS, Expected, address_with
 from robolink.config._selection import GROUP_MARK, names_meant, unknown_cell
 from robolink.errors import ConfigError
 from robolink.files.key_problems import is_not_known, sentence
@@ -116,7 +116,7 @@ class Cell:
 
     Attributes:
         name: What ``-c`` calls it.
-        url: The controller's URL.
+        url: The controller's URL, with the options that are keys of their own in a file.
         settings: Everything that is said about it.
         origins: For each key that is said, the file that said it.
     """
@@ -407,7 +407,8 @@ def _cell(
     if settings.url is None:
         missing = Problem(dotted(["cells", name, "url"]), tr("is missing in every file"))
         raise CELL_FILE.refusal(parts[0][0], [missing])
-    return Cell(name, settings.url, settings, origins)
+    url = address_with(settings.url, settings.model_dump(include=set(OPCUA_KEYS)))
+    return Cell(name, url, settings, origins)
 
 
 def _with_whole_paths(settings: "CellSettings", path: Path) -> "CellSettings":

@@ -11,6 +11,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
+from typing import Final
+from urllib.parse import parse_qsl, urlencode
 
 from robolink.config._files import config_files, read_document, whole_place
 from robolink.errors import ConfigError
@@ -20,6 +22,10 @@ from robolink.messages import listed, tr
 from robolink.model import PersonRole
 
 _KIND = "cells"
+
+PIN_KEY: Final = "server_certificate"
+OPCUA_KEYS: Final = (PIN_KEY, "user")
+"""Keys of a cell that are options of its URL: how an OPC UA server is known, and who logs in."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +74,26 @@ class Reach:
     home: str = ""
 
 
+def address_with(url: str, said: Mapping[str, object]) -> str:
+    """Return a cell's URL with what its file says beside it of an OPC UA server and its user.
+
+    What the URL says itself stays: a file that says both is refused when it is read as a whole.
+
+    Args:
+        url: The cell's URL.
+        said: The keys of the cell; those of :data:`OPCUA_KEYS` count.
+    """
+    if "+opcua://" not in url:
+        return url
+    given = dict(parse_qsl(url.partition("?")[2], keep_blank_values=True))
+    more = {
+        key: "".join(value.split()) if key == PIN_KEY else value
+        for key in OPCUA_KEYS
+        if key not in given and isinstance(value := said.get(key), str)
+    }
+    return f"{url}{'&' if given else '?'}{urlencode(more, safe=':')}" if more else url
+
+
 def reach_cell(name: str) -> Reach:
     """Return how to reach the cell ``name``, from no more settings than that needs.
 
@@ -99,7 +125,7 @@ def reach_cell(name: str) -> Reach:
             # Files with lower priority may refer to the robot at another address (``load_cells``).
             of_all = _of_farther(file.path) | of_all
             return Reach(
-                url=str(said["url"]),
+                url=address_with(str(said["url"]), said),
                 password_file=_text(said, "password_file"),
                 password_env=_text(said, "password_env"),
                 doubt=" ".join(doubts),

@@ -12,6 +12,7 @@ from robolink.locale.languages import language_named
 from robolink.messages import tr
 from robolink.model import ACCELERATION_RANGE_MM_S2, PersonRole
 from robolink.transport import parse_url
+from robolink.transport.opcua.security import fingerprint_digits
 
 ShortText = Annotated[str, Field(min_length=1, max_length=200)]
 Positive = Annotated[float, Field(gt=0)]
@@ -224,6 +225,12 @@ def _is_a_journal(text: str) -> str:
     return text
 
 
+def _is_a_fingerprint(text: str) -> str:
+    if fingerprint_digits(text) is None:
+        raise ValueError(tr("must be a SHA-256 fingerprint of 64 hexadecimal digits"))
+    return text
+
+
 JournalPlace = Annotated[Text, AfterValidator(_is_a_journal)]
 
 ComputerName = Annotated[str, Field(pattern=r"^[^\s/\\:@,;]{1,253}$")]
@@ -245,6 +252,8 @@ class CellSettings(BaseModel):
         tool: Number of the tool that is selected whenever nothing is being measured.
         password_file: File whose first line is the password, seen from the cell file.
         password_env: Environment variable that holds the password.
+        server_certificate: SHA-256 of the certificate of an OPC UA server, as a person compared it.
+        user: Who logs in to an OPC UA server.
         journal: Where the journal of this cell is: a path, seen from the cell file, or a URL.
         home: Name of the computer where the journal lies, and where alone the cell is changed.
         timeout_s: Longest wait for one answer.
@@ -286,6 +295,8 @@ class CellSettings(BaseModel):
     tool: Annotated[int, Field(ge=0, le=15)] | None = None
     password_file: Text | None = None
     password_env: Annotated[str, Field(pattern="^ROBOLINK_PASSWORD[A-Z0-9_]*$")] | None = None
+    server_certificate: Annotated[str, AfterValidator(_is_a_fingerprint)] | None = None
+    user: ShortText | None = None
     journal: JournalPlace | None = None
     home: ComputerName | None = None
     timeout_s: Positive | None = None
@@ -326,6 +337,19 @@ class CellSettings(BaseModel):
         if url is not None:
             parse_url(url)
         return url
+
+    @field_validator("server_certificate", "user")
+    @classmethod
+    def _is_for_opc_ua(cls, said: str | None, info: ValidationInfo) -> str | None:
+        # A URL that is wrong is missing from the data and already reported.
+        url = info.data.get("url")
+        if said is None or not url:
+            return said
+        if parse_url(url).medium != "opcua":
+            raise ValueError(tr("has no meaning: the url is not one of OPC UA"))
+        if info.field_name in parse_url(url).options:
+            raise ValueError(tr("is in the url too: say it once"))
+        return said
 
     @field_validator("acceleration_mm_s2")
     @classmethod

@@ -11,11 +11,13 @@ if TYPE_CHECKING:
     from robolink.transport._registry import TransportOpener as TransportOpener
     from robolink.transport._registry import open_mailbox_link as open_mailbox_link
     from robolink.transport._registry import open_modbus as open_modbus
+    from robolink.transport._registry import open_opcua as open_opcua
     from robolink.transport._registry import open_transport as open_transport
     from robolink.transport._url import LinkUrl as LinkUrl
     from robolink.transport._url import UrlOptions as UrlOptions
     from robolink.transport._url import far_end_of as far_end_of
     from robolink.transport._url import parse_url as parse_url
+    from robolink.transport._url import serves_several as serves_several
     from robolink.transport.byte_stream import TracingTransport as TracingTransport
     from robolink.transport.byte_stream import Transport as Transport
     from robolink.transport.dialogue import Dialogue as Dialogue
@@ -36,9 +38,10 @@ else:
         {
             "_mailbox_link": "MailboxHead MailboxLink",
             "_registry": (
-                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus open_transport"
+                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus open_opcua "
+                "open_transport"
             ),
-            "_url": "LinkUrl UrlOptions far_end_of parse_url",
+            "_url": "LinkUrl UrlOptions far_end_of parse_url serves_several",
             "byte_stream": "TracingTransport Transport",
             "dialogue": (
                 "Dialogue DialogueLog Passage format_dialogue opening_line "

@@ -15,6 +15,9 @@ SLOTS: Final = 15
 DEVICE_WORDS: Final = 4
 HEARTBEAT_WORD: Final = 62
 """Word of the client's heartbeat in the command block."""
+_OPCODE_WORD: Final = 1
+_RELEASE_WORDS: Final = slice(4, 6)
+_STOP: Final = 2003
 
 
 class MailboxHead(NamedTuple):
@@ -116,6 +119,15 @@ def require_words(words: Sequence[int], count: int) -> tuple[int, ...]:
         message = f"not {count} words of 0..65535"
         raise ValueError(message)
     return tuple(words)
+
+
+def is_stop(command: Sequence[int]) -> bool:
+    """Return whether a command block stops the axis group: 2003, which does not release it.
+
+    Some links let it pass where they let nothing else pass, so what is sent decides, and nobody's
+    word for it.
+    """
+    return command[_OPCODE_WORD] == _STOP and not any(command[_RELEASE_WORDS])
 
 
 def require_slot(slot: int) -> int:

@@ -18,7 +18,9 @@ from robolink.transport._url import LinkUrl, parse_url
 from robolink.transport.byte_stream import Transport, logged
 
 if TYPE_CHECKING:
+    from robolink.model import Secret
     from robolink.transport.modbus.client import ModbusClient
+    from robolink.transport.opcua.client import OpcuaClient
 
 TRANSPORTS_GROUP = "robolink.transports"
 
@@ -30,10 +32,14 @@ _MAILBOX_MEDIA = {
     "modbus-tcp": ("robolink.transport.modbus.mailbox", "open_modbus_link"),
     "modbus-rtu": ("robolink.transport.modbus.mailbox", "open_modbus_link"),
     "can": ("robolink.transport.can.mailbox", "open_canopen_link"),
+    "opcua": ("robolink.transport.opcua.mailbox", "open_opcua_link"),
 }
 _REGISTER_MEDIA = {
     "modbus-tcp": ("robolink.transport.modbus.opening", "open_modbus"),
     "modbus-rtu": ("robolink.transport.modbus.opening", "open_modbus"),
+}
+_NODE_MEDIA = {
+    "opcua": ("robolink.transport.opcua.opening", "open_opcua"),
 }
 
 _loaded: Final[dict[str, Callable[..., Any]]] = {}
@@ -78,7 +84,12 @@ def open_transport(
 
 
 def open_mailbox_link(
-    url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
+    url: str | LinkUrl,
+    *,
+    timeout_s: float = 3.0,
+    clock: Clock | None = None,
+    password: "Secret | None" = None,
+    stopping: bool = False,
 ) -> MailboxLink:
     """Open a link to a PLC mailbox.
 
@@ -86,10 +97,14 @@ def open_mailbox_link(
         url: For example ``softmotion+modbus-tcp://192.168.0.2:502``.
         timeout_s: Longest wait for the connection, and for each exchange.
         clock: Replaces the machine's clock; a simulator brings its own.
+        password: Of the user whom an OPC UA URL names.
+        stopping: Whether this is for a stop: then no date of a certificate holds it back.
 
     Raises:
-        ConfigError: The URL is wrong, or nothing knows its scheme.
+        ConfigError: The URL is wrong, nothing knows its scheme, or an OPC UA server is not the one
+            whose certificate was compared.
         ConnectError: No connection could be made, or nobody answers.
+        LoginRefusedError: An OPC UA server does not let its user in.
         TransportBrokenError: The bus or the line failed meanwhile.
         RemoteProtocolError: What answers makes no sense.
 
@@ -101,7 +116,9 @@ def open_mailbox_link(
         >>> link.close()
     """
     link = parse_url(url) if isinstance(url, str) else url
-    opened: MailboxLink = _find(link, _MAILBOX_MEDIA)(link, timeout_s=timeout_s, clock=clock)
+    login = {"password": password, "stopping": stopping} if link.medium in _NODE_MEDIA else {}
+    opener = _find(link, _MAILBOX_MEDIA)
+    opened: MailboxLink = opener(link, timeout_s=timeout_s, clock=clock, **login)
     if link.medium in _MAILBOX_MEDIA:
         return opened  # its bytes are traced
     from robolink.transport.word_traffic import WordTraffic
@@ -139,6 +156,45 @@ def open_modbus(
     """
     link = parse_url(url) if isinstance(url, str) else url
     opened: ModbusClient = _find(link, _REGISTER_MEDIA)(link, timeout_s=timeout_s, clock=clock)
+    return opened
+
+
+def open_opcua(
+    url: str | LinkUrl,
+    *,
+    timeout_s: float = 3.0,
+    clock: Clock | None = None,
+    password: "Secret | None" = None,
+) -> "OpcuaClient":
+    """Open a client for the nodes of an OPC UA server.
+
+    Args:
+        url: For example ``plc+opcua://192.168.0.2:4840?security=none``.
+        timeout_s: Longest wait for the connection, and for each answer.
+        clock: Replaces the machine's clock.
+        password: Of the user whom the URL names.
+
+    Raises:
+        ConfigError: The URL is wrong, a certificate is missing or another one than was kept, or
+            asyncua is not installed.
+        ConnectError: No connection could be made.
+        LoginRefusedError: The server does not let this user in.
+        RejectedError: It refuses the session, or offers less than was asked for.
+        TransportError, RemoteProtocolError: It does not answer, or not in OPC UA.
+
+    Example:
+        >>> from robolink.transport import open_opcua
+        >>> from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
+        >>> from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+        >>> with serve_opcua(SoftMotionSimulator(seed=1)) as host:
+        ...     client = open_opcua(host.url)
+        ...     client.describe("/DeviceSet/*/*/*/*/*/command").type_name
+        ...     client.close()
+        'UInt16[64]'
+    """
+    link = parse_url(url) if isinstance(url, str) else url
+    opener = _find(link, _NODE_MEDIA)
+    opened: OpcuaClient = opener(link, timeout_s=timeout_s, clock=clock, password=password)
     return opened
 
 

@@ -24,12 +24,14 @@ from robolink.remedy_words import RemedyWord, remedy_word
 _PSEUDO_TERMINAL: Final = re.compile(r"/dev/pts/\d+|/dev/ttys\d+")
 """Names that Linux and macOS give to pseudo terminals, and never to a port with a cable."""
 
-_MODBUS_PORT: Final = 502
+_USUAL_PORTS: Final = {"modbus-tcp": 502, "opcua": 4840}
+_SEVERAL_CLIENTS: Final = ("modbus-tcp", "opcua")
 _USUAL_UNITS: Final = {"modbus-tcp": "255", "modbus-rtu": "1"}
 _TELLING: Final = {
     "modbus-tcp": ("unit", "command"),
     "modbus-rtu": ("unit", "command"),
     "can": ("node",),
+    "opcua": ("symbols",),
 }
 
 
@@ -78,7 +80,7 @@ class LinkUrl:
             if (name, value) not in (("unit", usual_unit), ("command", "0"))
             if name in _TELLING.get(self.medium, ())
         }
-        port = _MODBUS_PORT if self.medium == "modbus-tcp" and self.port is None else self.port
+        port = _USUAL_PORTS.get(self.medium) if self.port is None else self.port
         told = "&".join(f"{name}={telling[name]}" for name in sorted(telling, reverse=True))
         identity = replace(self, port=port).identity
         return f"{identity}?{told}" if told else identity
@@ -233,7 +235,21 @@ class UrlOptions:
             )
 
 
-_APART: Final = ("unit", "command", "node", "interface")
+def serves_several(url: str) -> bool:
+    """Return whether the far end of a URL serves several clients, so that none keeps another out.
+
+    Args:
+        url: The controller.
+
+    Example:
+        >>> from robolink.transport import serves_several
+        >>> serves_several("epson+tcp://192.168.0.1:5000")
+        False
+    """
+    return any(f"+{medium}://" in url for medium in _SEVERAL_CLIENTS)
+
+
+_APART: Final = ("unit", "command", "node", "interface", "symbols")
 """Options that distinguish several controllers behind one address."""
 
 _LOOPBACK: Final = frozenset({"127.0.0.1", "::1"})
@@ -254,9 +270,9 @@ def far_end_of(url: str) -> frozenset[str]:
 
 
 def _places(link: LinkUrl) -> set[str]:
-    if link.medium not in ("tcp", "modbus-tcp"):
+    if link.medium not in ("tcp", *_SEVERAL_CLIENTS):
         return {f"{link.medium} {link.host}{os.path.realpath(link.path) if link.path else ''}"}
-    port = link.port or (_MODBUS_PORT if link.medium == "modbus-tcp" else 0)
+    port = link.port or _USUAL_PORTS.get(link.medium, 0)
     try:
         found = socket.getaddrinfo(link.host, port, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from robolink.controllers.movement_time import JointRates as JointRates
     from robolink.controllers.movement_time import MovementTimes as MovementTimes
     from robolink.controllers.movement_time import Way as Way
+    from robolink.controllers.plc_map.browsing import browse_nodes as browse_nodes
+    from robolink.controllers.plc_map.browsing import draft_from_nodes as draft_from_nodes
     from robolink.controllers.plc_map.controller import FlangeReader as FlangeReader
     from robolink.controllers.plc_map.controller import PlcMapController as PlcMapController
     from robolink.controllers.plc_map.controller import open_plc_map as open_plc_map
@@ -60,6 +62,7 @@ else:
             "epson.values": "EpsonVariables typed_value variable_type",
             "motion_group": "MotionGroupCore PolledGroup",
             "movement_time": "AnswerCounts JointRates MovementTimes Way",
+            "plc_map.browsing": "browse_nodes draft_from_nodes",
             "plc_map.controller": "FlangeReader PlcMapController open_plc_map",
             "preserving": "Preserver",
             "model_axes": "axes_of_model",

@@ -54,7 +54,7 @@ def stop_now(
 
     Args:
         url: Which controller. One that is open already is stopped over the link that it has.
-        password: An EPSON controller's remote password, if one is set.
+        password: An EPSON controller's remote password, if one is set, or that of an OPC UA user.
         timeout_s: Longest wait for the connection, and for one answer.
         clock: Replaces the machine's clock; a simulator brings its own.
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but a
@@ -168,7 +168,14 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.controllers.softmotion.wire import MailboxWire
     from robolink.transport import open_mailbox_link
 
-    mailbox = open_mailbox_link(link, timeout_s=means.timeout_s, clock=means.clock)
+    password = None
+    if means.password:
+        from robolink.model import Secret  # here, because no other mailbox has a login
+
+        password = Secret(means.password)
+    mailbox = open_mailbox_link(
+        link, timeout_s=means.timeout_s, clock=means.clock, password=password, stopping=True
+    )
     wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
         with Concerning(wire.identity):
@@ -227,7 +234,7 @@ def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
 def _stop_map(link: LinkUrl, means: _Means) -> "ControllerStatus":
     del means
     raise RejectedError(
-        tr("robolink neither moves nor stops a PLC with a register map."),
+        tr("robolink neither moves nor stops a PLC with a map."),
         remedy=tr("Do it at the machine."),
         controller=link.identity,
         request="Stop",

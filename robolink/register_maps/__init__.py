@@ -1,4 +1,4 @@
-"""Maps of a machine builder's own registers: where a PLC keeps its tool offsets.
+"""Maps of a machine builder's own registers or symbols: where a PLC keeps its tool offsets.
 
 A map is a TOML file of the schema ``robolink/plc-map/1``; docs/plc-maps.md explains every key.
 It is checked by pydantic, which is imported when a map is loaded and not before.
@@ -18,20 +18,11 @@ from robolink.register_maps._comparisons import (
     values_of,
 )
 from robolink.register_maps._confirmations import Confirmation, confirm, confirmation_of, revoke
-from robolink.register_maps._drafts import MapDraft, draft_from_csv
-from robolink.register_maps._loading import check_map, load_map
+from robolink.register_maps._drafts import MapDraft, component_of, draft_from_csv
+from robolink.register_maps._loading import check_map, load_map, load_plc_map, load_symbol_map
 from robolink.register_maps._map import (
-    ANGLES,
-    COMPONENTS,
-    LREAL_TOLERANCE,
-    AllZero,
-    Commit,
-    CommitKind,
-    Input,
-    MapProbe,
     MapSlot,
     Number,
-    NumberType,
     RegisterMap,
     RegisterTable,
     RegisterWords,
@@ -40,11 +31,41 @@ from robolink.register_maps._map import (
     describe_place,
     span_of,
 )
+from robolink.register_maps._places import (
+    ANGLES,
+    COMPONENTS,
+    LREAL_TOLERANCE,
+    AllZero,
+    AnyMap,
+    Cells,
+    Commit,
+    CommitKind,
+    Input,
+    MapProbe,
+    NumberType,
+    PlacedNumber,
+    PlacedSignal,
+    PlacedWord,
+    PlcMap,
+    ToolSlot,
+)
+from robolink.register_maps._symbols import (
+    Step,
+    SymbolCell,
+    SymbolMap,
+    SymbolNumber,
+    SymbolSignal,
+    SymbolSlot,
+    SymbolWord,
+    steps_in_words,
+)
 
 __all__ = [
     "ANGLES",
     "AllZero",
+    "AnyMap",
     "COMPONENTS",
+    "Cells",
     "Commit",
     "CommitKind",
     "ComparedValue",
@@ -59,21 +80,37 @@ __all__ = [
     "Number",
     "NumberType",
     "OpenValue",
+    "PlacedNumber",
+    "PlacedSignal",
+    "PlacedWord",
+    "PlcMap",
     "RegisterMap",
     "RegisterTable",
     "RegisterWords",
     "Signal",
+    "Step",
+    "SymbolCell",
+    "SymbolMap",
+    "SymbolNumber",
+    "SymbolSignal",
+    "SymbolSlot",
+    "SymbolWord",
+    "ToolSlot",
     "Word",
     "check_map",
     "compare",
     "compare_test",
+    "component_of",
     "confirm",
     "confirmation_of",
     "describe_place",
     "draft_from_csv",
     "load_map",
+    "load_plc_map",
+    "load_symbol_map",
     "revoke",
     "span_of",
+    "steps_in_words",
     "to_compare",
     "values_of",
 ]

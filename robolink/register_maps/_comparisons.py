@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, Self
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.register_maps._map import COMPONENTS, MapSlot, Number, RegisterMap
+from robolink.register_maps._places import COMPONENTS, AnyMap, PlacedNumber
 
 _FINEST: Final = 2
 """Number of decimals that a comparison needs: hundredths of a millimetre or degree."""
@@ -42,7 +42,7 @@ class MapValue(NamedTuple):
         return f"{self.tool}.{self.component}"
 
     @classmethod
-    def named(cls, text: str, register_map: RegisterMap) -> Self:
+    def named(cls, text: str, register_map: AnyMap) -> Self:
         """Return the value of a map that ``text`` names.
 
         Raises:
@@ -97,7 +97,7 @@ Found = Mapping[MapValue, float]
 """Values found by the map, in mm and degrees; unreadable values are missing."""
 
 
-def values_of(register_map: RegisterMap) -> dict[MapValue, Number]:
+def values_of(register_map: AnyMap) -> dict[MapValue, PlacedNumber]:
     """Return every component of every tool of a map."""
     return {
         MapValue(slot.tool, name): slot.components[name]
@@ -107,7 +107,7 @@ def values_of(register_map: RegisterMap) -> dict[MapValue, Number]:
     }
 
 
-def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str) -> ComparedValue:
+def compare(register_map: AnyMap, found: Found, value: MapValue, shown: str) -> ComparedValue:
     """Compare one value with the machine's own screen.
 
     The screen may round or cut off; that many digits are compared as were typed, and too few of
@@ -150,7 +150,7 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
 
 
 def compare_test(
-    register_map: RegisterMap, before: Found, found: Found, value: MapValue, entered: str
+    register_map: AnyMap, before: Found, found: Found, value: MapValue, entered: str
 ) -> ComparedValue:
     """Compare one value with what a person has just entered at the machine's own screen.
 
@@ -193,7 +193,7 @@ def compare_test(
 
 
 def to_compare(
-    register_map: RegisterMap, found: Found, compared: Mapping[MapValue, ComparedValue]
+    register_map: AnyMap, found: Found, compared: Mapping[MapValue, ComparedValue]
 ) -> list[OpenValue]:
     """Return the values that, with those already compared, show that a map is right.
 
@@ -227,7 +227,7 @@ def tool_known(compared: Mapping[MapValue, ComparedValue], tool: int) -> bool:
 
 
 def component_known(
-    register_map: RegisterMap, compared: Mapping[MapValue, ComparedValue], value: MapValue
+    register_map: AnyMap, compared: Mapping[MapValue, ComparedValue], value: MapValue
 ) -> bool:
     """Whether a comparison showed this component, at this tool or one with the same layout."""
     alike = _like(register_map, value)
@@ -238,7 +238,7 @@ class _Plan:
     """The values to compare, and what will be known afterwards."""
 
     def __init__(
-        self, register_map: RegisterMap, found: Found, compared: Mapping[MapValue, ComparedValue]
+        self, register_map: AnyMap, found: Found, compared: Mapping[MapValue, ComparedValue]
     ) -> None:
         self._numbers = values_of(register_map)
         self._found = found
@@ -361,7 +361,7 @@ def _differs(
     elsewhere = (
         tr("That is what {others} reads: perhaps the map has them exchanged.", others=others[0])
         if others
-        else tr("Compare address, type, word_order, scale and unit with the PLC's register list.")
+        else tr("Compare place, type, word_order, scale and unit with the PLC's own list.")
     )
     return MapDiffersError(
         tr(
@@ -377,30 +377,21 @@ def _said(value: MapValue, text: str) -> dict[str, object]:
     return {"key": value, "shown": text}
 
 
-def _digits_needed(number: Number) -> int:
+def _digits_needed(number: PlacedNumber) -> int:
     """Return how many decimals show a number to hundredths, or to its own step."""
     step = _step(number)
     return next((d for d in range(_FINEST) if step * 10**d >= 1 - _SLACK), _FINEST)
 
 
-def _step(number: Number) -> float:
+def _step(number: PlacedNumber) -> float:
     return abs(number.factor) if number.type.whole else 0.0
 
 
-def _like(register_map: RegisterMap, value: MapValue) -> list[MapValue]:
+def _like(register_map: AnyMap, value: MapValue) -> list[MapValue]:
     """Return this component of all tools with the same layout."""
-    layout = _layout(register_map.slots[value.tool])
+    layout = register_map.slots[value.tool].layout
     return [
         MapValue(slot.tool, value.component)
         for slot in register_map.slots.values()
-        if _layout(slot) == layout
+        if slot.layout == layout
     ]
-
-
-def _layout(slot: MapSlot) -> tuple[object, ...]:
-    base = slot.span.start
-    return tuple(
-        (name, n.table, n.address - base, n.type, n.low_word_first, n.swapped_bytes, n.factor)
-        for name in COMPONENTS
-        if (n := slot.components.get(name)) is not None
-    )

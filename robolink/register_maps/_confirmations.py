@@ -22,7 +22,7 @@ from robolink.register_maps._comparisons import (
     tool_known,
     values_of,
 )
-from robolink.register_maps._map import RegisterMap
+from robolink.register_maps._places import AnyMap
 from robolink.timing import wall_label
 
 _FORMAT: Final = "robolink/plc-map-confirmation/2"
@@ -46,7 +46,7 @@ class Confirmation:
         """Whether a comparison showed that this tool's place is not another tool's."""
         return tool_known(self.compared, tool)
 
-    def missing(self, register_map: RegisterMap) -> list[MapValue]:
+    def missing(self, register_map: AnyMap) -> list[MapValue]:
         """Return the values that may not be changed yet."""
         return [
             value
@@ -56,7 +56,7 @@ class Confirmation:
         ]
 
 
-def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | None:
+def confirmation_of(identity: str, register_map: AnyMap) -> Confirmation | None:
     """Return what was compared of this very map at this PLC, ``None`` for nothing.
 
     A record that cannot be read confirms nothing, and neither does one of the first format, in
@@ -79,7 +79,7 @@ def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | 
 
 
 def confirm(
-    identity: str, register_map: RegisterMap, *, by: str, compared: Iterable[ComparedValue]
+    identity: str, register_map: AnyMap, *, by: str, compared: Iterable[ComparedValue]
 ) -> Confirmation:
     """Record that a person found values of this map right at this PLC.
 
@@ -132,7 +132,7 @@ def confirm(
     return made
 
 
-def revoke(identity: str, register_map: RegisterMap) -> Confirmation | None:
+def revoke(identity: str, register_map: AnyMap) -> Confirmation | None:
     """Withdraw the confirmation of a map, because a comparison showed that it is wrong.
 
     Returns:
@@ -152,7 +152,7 @@ def revoke(identity: str, register_map: RegisterMap) -> Confirmation | None:
     return held
 
 
-def _path(identity: str, register_map: RegisterMap) -> Path:
+def _path(identity: str, register_map: AnyMap) -> Path:
     return state_folder("plc-maps") / file_name(f"{identity} {register_map.sha256}")
 
 

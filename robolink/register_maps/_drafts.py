@@ -35,7 +35,8 @@ from typing import Final, NamedTuple
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.register_maps._map import COMPONENTS, LAST_ADDRESS, RegisterTable
+from robolink.register_maps._map import LAST_ADDRESS, RegisterTable
+from robolink.register_maps._places import COMPONENTS
 
 _TOOL: Final = frozenset({"tool", "tools", "nozzle", "nozzles", "needle", "needles", "t"})
 _BESIDE: Final = frozenset(

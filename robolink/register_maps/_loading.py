@@ -10,12 +10,12 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from robolink.errors import ConfigError
 from robolink.files.key_problems import is_not_known, sentence
 from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
 from robolink.register_maps._map import (
     LAST_ADDRESS,
-    CommitKind,
     MapSlot,
     Number,
     RegisterMap,
@@ -25,10 +25,13 @@ from robolink.register_maps._map import (
     describe_place,
     span_of,
 )
+from robolink.register_maps._places import CommitKind
+from robolink.register_maps._symbols import SymbolMap
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+    from robolink.register_maps._symbol_tables import SymbolFile
     from robolink.register_maps._tables import MapFile
 
 MAP_FILE: Final = FileKind(
@@ -38,17 +41,54 @@ MAP_FILE: Final = FileKind(
 )
 
 
-def load_map(path: Path) -> RegisterMap:
-    """Return the map in a file.
+def load_plc_map(path: Path) -> RegisterMap | SymbolMap:
+    """Return the map in a file, of registers or of symbols.
 
     Raises:
         ConfigError: It cannot be read, is no TOML, or is wrong; every problem is told with
             its path.
     """
-    register_map, problems = _checked(path)
-    if register_map is None or problems:
+    plc_map, problems = _checked(path)
+    if plc_map is None or problems:
         raise MAP_FILE.refusal(path, problems)
-    return register_map
+    return plc_map
+
+
+def load_map(path: Path) -> RegisterMap:
+    """Return the map of registers in a file.
+
+    Raises:
+        ConfigError: As :func:`load_plc_map`, or it is a map of symbols.
+    """
+    found = load_plc_map(path)
+    if isinstance(found, RegisterMap):
+        return found
+    raise ConfigError(
+        tr("{map} names symbols, not registers.", map=MAP_FILE.named(path)),
+        remedy=_which_link(),
+    )
+
+
+def load_symbol_map(path: Path) -> SymbolMap:
+    """Return the map of symbols in a file.
+
+    Raises:
+        ConfigError: As :func:`load_plc_map`, or it is a map of registers.
+    """
+    found = load_plc_map(path)
+    if isinstance(found, SymbolMap):
+        return found
+    raise ConfigError(
+        tr("{map} names registers, not symbols.", map=MAP_FILE.named(path)),
+        remedy=_which_link(),
+    )
+
+
+def _which_link() -> str:
+    return tr(
+        "A map of registers goes with plc+modbus-tcp://HOST or plc+modbus-rtu:///DEVICE, one of "
+        "symbols with plc+opcua://HOST:4840."
+    )
 
 
 def check_map(path: Path) -> tuple[Problem, ...]:
@@ -60,31 +100,86 @@ def check_map(path: Path) -> tuple[Problem, ...]:
     return tuple(_checked(path)[1])
 
 
-def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
+def _checked(path: Path) -> tuple[RegisterMap | SymbolMap | None, list[Problem]]:
+    content = MAP_FILE.read(path)
+    document = MAP_FILE.parse(path, content)
+    registers, symbols = _keys_in(document, _OF_REGISTERS), _keys_in(document, _OF_SYMBOLS)
+    if registers and symbols:
+        mixed = tr(
+            "names a register ({register}) and a symbol ({symbol}): a map is of registers or of "
+            "symbols",
+            register=registers[0],
+            symbol=symbols[0],
+        )
+        return None, [Problem("", mixed)]
+    sha256 = hashlib.sha256(content).hexdigest()
+    return _of_symbols(document, sha256) if symbols else _of_registers(document, sha256)
+
+
+_OF_REGISTERS: Final = frozenset({"address", "table", "word_order", "byte_order"})
+_OF_SYMBOLS: Final = frozenset({"node", "root", "element", "field", "cycle_ms"})
+"""Keys that tell of which kind of place a map is."""
+
+
+def _keys_in(document: object, keys: frozenset[str], path: str = "") -> list[str]:
+    """Return the paths at which one of ``keys`` stands, as problems name them."""
+    if isinstance(document, Mapping):
+        found = []
+        for key, value in document.items():
+            here = f"{path}.{key}" if path else str(key)
+            found += [here] if key in keys else _keys_in(value, keys, here)
+        return found
+    if isinstance(document, list):
+        parts = (_keys_in(one, keys, f"{path}#{at}") for at, one in enumerate(document, start=1))
+        return [found for part in parts for found in part]
+    return []
+
+
+def _of_registers(document: object, sha256: str) -> tuple[RegisterMap | None, list[Problem]]:
     from pydantic import ValidationError
 
-    from robolink.register_maps._tables import MapFile, Resolving
+    from robolink.register_maps._tables import KEYS, MapFile, RegisterResolving
 
-    content = MAP_FILE.read(path)
     try:
-        file = MapFile.model_validate(MAP_FILE.parse(path, content))
+        file = MapFile.model_validate(document)
     except ValidationError as error:
-        return None, problems_of(error)
-    resolving = Resolving(file)
-    register_map = resolving.resolve(hashlib.sha256(content).hexdigest())
-    if register_map is None:
+        return None, problems_of(error, KEYS)
+    resolving = RegisterResolving(file)
+    found = resolving.resolve(sha256)
+    if not isinstance(found, RegisterMap):
         return None, resolving.problems
-    return register_map, problems_together(file, register_map)
+    return found, problems_together(file, found)
+
+
+def _of_symbols(document: object, sha256: str) -> tuple[SymbolMap | None, list[Problem]]:
+    from pydantic import ValidationError
+
+    from robolink.register_maps._symbol_tables import (
+        SYMBOL_KEYS,
+        SymbolFile,
+        SymbolResolving,
+        symbol_problems,
+    )
+
+    try:
+        file = SymbolFile.model_validate(document)
+    except ValidationError as error:
+        return None, problems_of(error, SYMBOL_KEYS)
+    resolving = SymbolResolving(file)
+    found = resolving.resolve(sha256)
+    if not isinstance(found, SymbolMap):
+        return None, resolving.problems
+    return found, [*_twice(file), *symbol_problems(found)]
 
 
 _COMMIT_DEPTH: Final = 2
 """Length of a pydantic location beyond which it contains the kind of commit."""
 
 
-def problems_of(error: "ValidationError") -> list[Problem]:
-    """Return everything that pydantic reports."""
+def problems_of(error: "ValidationError", keys: Sequence[str]) -> list[Problem]:
+    """Return everything that pydantic reports; one of ``keys`` is suggested for an unknown one."""
     return [
-        Problem(_path(detail["loc"]), _sentence(detail))
+        Problem(_path(detail["loc"]), _sentence(detail, keys))
         for detail in error.errors(include_url=False, include_input=False)
     ]
 
@@ -100,12 +195,10 @@ def _path(location: Sequence[int | str]) -> str:
     return path
 
 
-def _sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
+def _sentence(detail: Any, keys: Sequence[str]) -> str:  # noqa: ANN401 - pydantic's own form
     match detail["type"]:
         case "extra_forbidden":
-            from robolink.register_maps._tables import KEYS
-
-            return is_not_known(str(detail["loc"][-1]), sorted(KEYS))
+            return is_not_known(str(detail["loc"][-1]), keys)
         case "union_tag_invalid" | "union_tag_not_found":
             return tr("needs a kind: {kinds}", kinds="commit_bit, level, none")
         case "list_type":
@@ -174,7 +267,7 @@ def problems_together(file: "MapFile", found: RegisterMap) -> list[Problem]:
     ]
 
 
-def _twice(file: "MapFile") -> Iterator[Problem]:
+def _twice(file: "MapFile | SymbolFile") -> Iterator[Problem]:
     numbered = (
         ("tools", [t.number for t in file.tools]),
         ("inputs", [i.number for i in file.inputs]),

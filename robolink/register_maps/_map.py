@@ -1,4 +1,4 @@
-"""A map ready for use: places with units, without open defaults.
+"""A map of registers ready for use: places with units, without open defaults.
 
 How a length or an angle stands in registers.
 
@@ -13,14 +13,23 @@ whoever reads a place is shown both, because tools disagree about which one they
 (docs/reference/softmotion.md 4.4).
 """
 
-import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
 from robolink.messages import tr
+from robolink.register_maps._places import (
+    COMPONENTS,
+    AllZero,
+    Commit,
+    Input,
+    MapProbe,
+    NumberType,
+    is_absurd,
+    scale_in_words,
+)
 
 LAST_ADDRESS: Final = 0xFFFF
 
@@ -134,45 +143,6 @@ class RegisterWords:
         return range(self.address, self.address + self.count)
 
 
-LREAL_TOLERANCE: Final = 1e-9
-"""Largest difference between equal LREALs (docs/reference/rules.md 3)."""
-
-_TINY: Final = 1e-20
-"""Smallest plausible value; a smaller one that is not 0 means that the words are in the wrong
-order."""
-
-
-class NumberType(StrEnum):
-    """How a number is encoded, by the names that PLC programmers use."""
-
-    INT16 = "int16"
-    UINT16 = "uint16"
-    INT32 = "int32"
-    UINT32 = "uint32"
-    REAL = "REAL"
-    LREAL = "LREAL"
-
-    @property
-    def words(self) -> int:
-        """How many registers it takes."""
-        return struct.calcsize(_FORMATS[self]) // 2
-
-    @property
-    def whole(self) -> bool:
-        """Whether it holds whole numbers only."""
-        return self not in (NumberType.REAL, NumberType.LREAL)
-
-
-_FORMATS: Final = {
-    NumberType.INT16: ">h",
-    NumberType.UINT16: ">H",
-    NumberType.INT32: ">i",
-    NumberType.UINT32: ">I",
-    NumberType.REAL: ">f",
-    NumberType.LREAL: ">d",
-}
-
-
 @dataclass(frozen=True, slots=True)
 class Number:
     """A length in mm, or an angle in degrees, in the registers of a PLC.
@@ -203,65 +173,50 @@ class Number:
         """The place as a person reads it."""
         return describe_place(self.table, self.address)
 
+    @property
+    def cells(self) -> range:
+        """The addresses that it takes."""
+        return self.registers
+
+    @property
+    def form(self) -> str:
+        """How it stands there, as a person reads it."""
+        words = [str(self.type)]
+        if self.type.words > 1:
+            words.append(tr("low word first") if self.low_word_first else tr("high word first"))
+        if self.swapped_bytes:
+            words.append(tr("bytes swapped"))
+        return ", ".join([*words, *scale_in_words(self.factor)])
+
     def encode(self, value: float) -> tuple[int, ...]:
         """Return the registers that hold ``value`` (mm, degrees) as nearly as they can.
 
         Raises:
             OverflowError: They cannot hold it.
         """
-        raw: float = value / self.factor + 0.0  # no negative zero
-        try:
-            data = struct.pack(_FORMATS[self.type], round(raw) if self.type.whole else raw)
-        except struct.error as error:
-            raise OverflowError(str(error)) from error
+        data = self.type.packed(value / self.factor)
         words = [word for (word,) in struct.iter_unpack(">H", data)]
         return tuple(self._as_stored(words))
 
-    def decode(self, words: tuple[int, ...]) -> float:
+    def decode(self, stored: Sequence[float]) -> float:
         """Return the value in mm or degrees; it may be not a number, or an absurd one."""
-        raw: float
-        data = struct.pack(f">{len(words)}H", *self._as_stored(list(words)))
-        (raw,) = struct.unpack(_FORMATS[self.type], data)
+        words = self._as_stored([int(word) for word in stored])
+        raw = self.type.unpacked(struct.pack(f">{len(words)}H", *words))
         return raw * self.factor + 0.0  # turns a negative zero into zero
 
     def is_absurd(self, value: float) -> bool:
         """Return whether ``value`` is not a number, or smaller than any length that is not 0."""
-        return not math.isfinite(value) or 0 < abs(value / self.factor) < _TINY
+        return is_absurd(value, self.factor)
 
     def slack(self, value: float) -> float:
         """Return how far from ``value`` another may be that these registers store alike."""
-        if self.type.whole:
-            return abs(self.factor) / 2
-        if self.type is NumberType.REAL:
-            _, exponent = math.frexp(value / self.factor)
-            return math.ldexp(abs(self.factor), exponent - 24)
-        return LREAL_TOLERANCE
+        return self.type.slack(value, self.factor)
 
     def _as_stored(self, words: list[int]) -> list[int]:
         """Swap words and bytes; done twice it changes nothing."""
         if self.swapped_bytes:
             words = [(word & 0xFF) << 8 | word >> 8 for word in words]
         return words[::-1] if self.low_word_first else words
-
-
-COMPONENTS: Final = ("x", "y", "z", "u", "v", "w")
-"""Components of a tool offset and of a pose, in the order of :class:`robolink.model.Pose`."""
-
-ANGLES: Final = frozenset("uvw")
-"""Components that are in degrees; the others are in mm."""
-
-
-class AllZero(StrEnum):
-    """The meaning of a slot whose registers are all zero.
-
-    A CODESYS PLC zeroes what clients may write when its watchdog expires
-    (docs/reference/softmotion.md 4.1), so that all zeros may be a lost link and no tool
-    (docs/reference/faults.md F30).
-    """
-
-    REFUSE = "refuse"
-    UNDEFINED = "undefined"
-    TOOL = "tool"
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,65 +250,26 @@ class MapSlot:
         """Whether there is no gap, so that one request writes it all."""
         return len(self.span) == sum(len(number.registers) for number in self.components.values())
 
+    @property
+    def writable(self) -> bool:
+        """Whether the table is one that a client may write."""
+        return self.table.writable
+
+    @property
+    def layout(self) -> tuple[object, ...]:
+        """What is the same of two tools that are laid out alike: distances, types and scales."""
+        base = self.span.start
+        return tuple(
+            (name, n.table, n.address - base, n.type, n.low_word_first, n.swapped_bytes, n.factor)
+            for name in COMPONENTS
+            if (n := self.components.get(name)) is not None
+        )
+
 
 def span_of(components: Mapping[str, Number]) -> range:
     """Return the addresses from the first to the last register, gaps included."""
     taken = [number.registers for number in components.values()]
     return range(min(r.start for r in taken), max(r.stop for r in taken))
-
-
-class CommitKind(StrEnum):
-    """How the PLC is asked to take new values over."""
-
-    COMMIT_BIT = "commit_bit"
-    LEVEL = "level"
-    NONE = "none"
-
-
-@dataclass(frozen=True, slots=True)
-class Commit:
-    """How new values take effect.
-
-    Attributes:
-        kind: The handshake.
-        request: Switched on when the values stand; off again after ``answer``.
-        answer: The PLC's done or acknowledge signal.
-        busy: The PLC must not be asked now.
-        error: The PLC refused, or is in error.
-        error_code: Number of the error; alone, a number that is not 0 is an error.
-        error_texts: What the numbers mean.
-        tool_number: Told which tool it is, before the request.
-        timeout_s: Longest wait for each answer.
-        settle_s: Without a handshake: how long before the values are read back.
-    """
-
-    kind: CommitKind = CommitKind.NONE
-    request: Signal | None = None
-    answer: Signal | None = None
-    busy: Signal | None = None
-    error: Signal | None = None
-    error_code: Word | None = None
-    error_texts: Mapping[int, str] = field(default_factory=dict, hash=False)
-    tool_number: Word | None = None
-    timeout_s: float = 2.0
-    settle_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class MapProbe:
-    """A constant in the PLC that shows word order and offset."""
-
-    number: Number
-    value: float
-
-
-@dataclass(frozen=True, slots=True)
-class Input:
-    """An input that can be read."""
-
-    number: int
-    name: str
-    signal: Signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -379,17 +295,17 @@ class RegisterMap:
     name: str
     sha256: str
     slots: Mapping[int, MapSlot] = field(hash=False)
-    commit: Commit = field(default_factory=Commit)
-    probe: MapProbe | None = None
+    commit: Commit[Signal, Word] = field(default_factory=Commit)
+    probe: MapProbe[Number] | None = None
     permit: Signal | None = None
     selected: Word | None = None
     device_id: RegisterWords | None = None
     flange: Mapping[str, Number] = field(default_factory=dict, hash=False)
-    inputs: Mapping[int, Input] = field(default_factory=dict, hash=False)
+    inputs: Mapping[int, Input[Signal]] = field(default_factory=dict, hash=False)
     all_zero: AllZero = AllZero.REFUSE
     largest_mm: float = 2000.0
 
     @property
     def writable(self) -> bool:
         """Whether tools can be written: all are in holding registers."""
-        return all(slot.table.writable for slot in self.slots.values())
+        return all(slot.writable for slot in self.slots.values())

@@ -1,4 +1,4 @@
-"""A PLC that keeps tool offsets in the machine builder's own registers, and opening one.
+"""A PLC that keeps tool offsets in registers or symbols of its own, and opening one.
 
 The inputs that a map names.
 
@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, ClassVar, Final, NoReturn
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.driver_link import DriverPart
 from robolink.controllers.motion_group import MotionGroupCore
-from robolink.controllers.plc_map.link import MappedPlc, RegisterClient
+from robolink.controllers.plc_map.link import MappedPlc
+from robolink.controllers.plc_map.registers import RegisterClient
 from robolink.controllers.plc_map.slots import OffsetValues
+from robolink.controllers.plc_map.symbol_client import SymbolClient
 from robolink.controllers.plc_map.tools import RegisterResolver, RegisterToolTable
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.registry import ConnectionTerms
@@ -30,11 +32,12 @@ from robolink.model import (
     Identity,
     OutcomeLog,
     Pose,
+    Secret,
 )
-from robolink.register_maps import RegisterMap, load_map, span_of
+from robolink.register_maps import AnyMap, RegisterMap, SymbolMap, load_map, load_symbol_map
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import AnswerTimes, Clock
-from robolink.transport import LinkUrl, open_modbus
+from robolink.transport import LinkUrl, open_modbus, open_opcua
 
 if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
@@ -47,7 +50,7 @@ class MappedInputs(DriverPart):
 
     def __init__(self, plc: MappedPlc) -> None:
         super().__init__(plc)
-        self._registers = plc.registers
+        self._places = plc.places
         self._inputs = plc.register_map.inputs
 
     def names(self) -> dict[int, str]:
@@ -65,7 +68,7 @@ class MappedInputs(DriverPart):
                 tr("The map has no input {number}.", number=bit),
                 remedy=known_names(self._inputs),
             )
-        return self._registers.is_on(self._inputs[bit].signal)
+        return self._places.is_on(self._inputs[bit].signal)
 
     def set_output(self, bit: int, on: bool) -> NoReturn:  # noqa: ARG002 - the model's form
         """Refuse: a map has no outputs.
@@ -87,6 +90,9 @@ _FAR_MM: Final = 100_000.0
 _FAR_DEG: Final = 36_000.0
 """Largest plausible distance, in mm, and turn, in degrees, of a head."""
 
+_SYMBOLS: Final = "opcua"
+"""Medium whose maps name symbols; those of all others name registers."""
+
 _IN_PROCESS: Final = "sim"
 """Medium of a simulator in this process; its tools are lost when the process ends."""
 
@@ -97,7 +103,7 @@ class FlangeReader(MotionGroupCore):
     def __init__(self, plc: MappedPlc) -> None:
         super().__init__(plc)
         self._plc = plc
-        self._registers = plc.registers
+        self._places = plc.places
         self._flange = plc.register_map.flange
         self._name = plc.register_map.name
         self._values = OffsetValues(plc.register_map)
@@ -118,14 +124,12 @@ class FlangeReader(MotionGroupCore):
                 tr("This PLC does not report where the flange is."),
                 remedy=tr(
                     "Read the poses at the HMI and give them with {poses}; or add [flange] to the "
-                    "map, if the PLC has registers for it.",
+                    "map, if the PLC tells it.",
                     poses=remedy_word(RemedyWord.GIVEN_POSES),
                 ),
             )
-        span = span_of(self._flange)
-        table = self._flange["x"].table
-        words = dict(zip(span, self._registers.read_twice(table, span), strict=True))
-        pose = self._values.numbers(self._flange, words, largest_mm=_FAR_MM, largest_deg=_FAR_DEG)
+        cells = self._places.stable(self._flange)
+        pose = self._values.numbers(self._flange, cells, largest_mm=_FAR_MM, largest_deg=_FAR_DEG)
         return Pose(*pose, tool=0)
 
     def move_to(self, *_asked: object, **_how: object) -> NoReturn:
@@ -155,10 +159,11 @@ class PlcMapController(ControllerCore):
         groups: One, which tells where the flange is, if the map has that, and refuses to move.
 
     Args:
-        client: An open Modbus client; the controller owns it from here on.
+        client: An open client, of Modbus for a map of registers, of OPC UA for one of symbols; the
+            controller owns it from here on.
         register_map: The map.
         outcomes: Where doubtful outcomes of this PLC are kept.
-        simulated: Whether it is a simulator's address; nothing in the registers tells that.
+        simulated: Whether it is a simulator's address; nothing that is read tells that.
 
     Example:
         >>> from pathlib import Path
@@ -183,14 +188,14 @@ class PlcMapController(ControllerCore):
 
     def __init__(
         self,
-        client: RegisterClient,
-        register_map: RegisterMap,
+        client: RegisterClient | SymbolClient,
+        register_map: RegisterMap | SymbolMap,
         outcomes: OutcomeLog,
         *,
         simulated: bool = False,
     ) -> None:
         plc = self._plc = MappedPlc(client, register_map, outcomes, simulated=simulated)
-        self.register_map = register_map
+        self.register_map: AnyMap = register_map
         self.groups = (FlangeReader(plc),)
         able = replace(self.OF_KIND, tool_write=register_map.writable)
         super().__init__(plc, capabilities=able, tools=RegisterToolTable(plc))
@@ -212,12 +217,12 @@ class PlcMapController(ControllerCore):
     @property
     def exchanges(self) -> int:
         """Requests sent so far."""
-        return self._plc.registers.exchanges
+        return self._plc.places.exchanges
 
     @property
     def answers(self) -> AnswerTimes:
         """How long it takes to answer."""
-        return self._plc.registers.answers
+        return self._plc.places.answers
 
     def who(self) -> Identity:
         """Return which PLC this is: what a person confirms about a map is valid for that one.
@@ -286,7 +291,7 @@ class PlcMapController(ControllerCore):
         An answer shows that the PLC is alive.
         """
         slot = next(iter(self.register_map.slots.values()))
-        self._plc.registers.read(slot.table, slot.span)
+        self._plc.places.once(slot.components)
         fault, busy = self.tools.handshake.fault(), self.tools.handshake.is_busy()
         return ControllerStatus(
             remote=self._plc.permitted,
@@ -297,7 +302,7 @@ class PlcMapController(ControllerCore):
         )
 
     def _close_link(self) -> None:
-        self._plc.registers.close()
+        self._plc.places.close()
 
 
 class _KeepsOthersOut(Preserver):
@@ -314,7 +319,13 @@ def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         RobolinkError: As :func:`open_plc_map`.
     """
     record = partial(terms.record_at, durable=url.medium != _IN_PROCESS)
-    return open_plc_map(url, outcomes=record, timeout_s=terms.timeout_s, clock=terms.clock)
+    return open_plc_map(
+        url,
+        outcomes=record,
+        timeout_s=terms.timeout_s,
+        clock=terms.clock,
+        password=terms.password,
+    )
 
 
 def open_plc_map(
@@ -324,22 +335,26 @@ def open_plc_map(
     timeout_s: float = 3.0,
     clock: Clock | None = None,
     compare_probe: bool = True,
+    password: Secret | None = None,
 ) -> PlcMapController:
     """Open ``plc+modbus-tcp://host?map=machine.toml`` and compare the probe, if there is one.
+
+    The map of ``plc+opcua://host`` names symbols; types and lengths are compared, too.
 
     Args:
         url: ``map`` names the map, seen from the working folder, ``simulated=yes`` stands in the
             address of a simulator; the other options are those of a Modbus client
-            (docs/reference/mailbox.md).
+            (docs/reference/mailbox.md) or of an OPC UA client.
         outcomes: Opens the record of the PLC whose identity it is given.
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Replaces the machine's clock.
         compare_probe: Whether to; what looks at a map that is not right yet does without.
+        password: Of the user whom an OPC UA URL names.
 
     Raises:
         ConfigError: The URL, an option or the map is wrong.
         ConnectError: No connection.
-        RemoteProtocolError: The probe differs; says what the map should say.
+        RemoteProtocolError: The probe differs, and what the map should say; or a node does.
 
     Example:
         >>> from pathlib import Path
@@ -358,7 +373,11 @@ def open_plc_map(
         'simulated dispenser'
     """
     register_map, url, simulated = _with_map(url)
-    client = open_modbus(url, timeout_s=timeout_s, clock=clock)
+    client: RegisterClient | SymbolClient
+    if url.medium == _SYMBOLS:
+        client = open_opcua(url, timeout_s=timeout_s, clock=clock, password=password)
+    else:
+        client = open_modbus(url, timeout_s=timeout_s, clock=clock)
     try:
         with Concerning(client.identity):
             controller = PlcMapController(
@@ -376,7 +395,7 @@ def open_plc_map(
     return controller
 
 
-def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl, bool]:
+def _with_map(url: LinkUrl) -> tuple[RegisterMap | SymbolMap, LinkUrl, bool]:
     """Return the map that a URL names, the URL of the client, and whether it is a simulator's."""
     options = dict(url.options)
     file, said = options.pop("map", ""), options.pop("simulated", None)
@@ -390,7 +409,8 @@ def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl, bool]:
     if said is not None:
         _require_simulator(url, said)
     simulated = said is not None or url.medium == _IN_PROCESS
-    return load_map(Path(file).expanduser()), replace(url, options=options), simulated
+    load = load_symbol_map if url.medium == _SYMBOLS else load_map
+    return load(Path(file).expanduser()), replace(url, options=options), simulated
 
 
 def _require_simulator(url: LinkUrl, said: str) -> None:

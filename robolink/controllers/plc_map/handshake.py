@@ -7,7 +7,7 @@ stays on until the answer comes. None: what is written counts. Each wait has its
 from contextlib import suppress
 from typing import Final
 
-from robolink.controllers.plc_map.link import Registers
+from robolink.controllers.plc_map.places import Places
 from robolink.errors import (
     BusyError,
     NotReadyError,
@@ -17,7 +17,7 @@ from robolink.errors import (
     RobolinkError,
 )
 from robolink.messages import listed, tr
-from robolink.register_maps import Commit, CommitKind, Signal
+from robolink.register_maps import Commit, CommitKind, PlacedSignal, PlacedWord
 from robolink.stop_latch import CommandClass
 from robolink.timing import Deadline
 
@@ -27,8 +27,8 @@ _POLL_S: Final = 0.02
 class Handshake:
     """The commit of one map."""
 
-    def __init__(self, registers: Registers, commit: Commit) -> None:
-        self._registers = registers
+    def __init__(self, places: Places, commit: Commit[PlacedSignal, PlacedWord]) -> None:
+        self._places = places
         self._commit = commit
 
     @property
@@ -46,13 +46,13 @@ class Handshake:
             NotReadyError: It is in error already.
         """
         asked = self._commit.request
-        if asked is not None and self._registers.is_on(asked):
-            self._registers.switch(asked, on=False, kind=CommandClass.CALM)
-        deadline = Deadline.after(self._registers.clock, self._commit.timeout_s)
+        if asked is not None and self._places.is_on(asked):
+            self._places.switch(asked, on=False, kind=CommandClass.CALM)
+        deadline = Deadline.after(self._places.clock, self._commit.timeout_s)
         while (hindrance := self._hindrance()) is not None:
             if deadline.expired:
                 raise hindrance
-            self._registers.clock.sleep(_POLL_S)
+            self._places.clock.sleep(_POLL_S)
 
     def wait_out(self) -> None:
         """Wait as long as an earlier request may be in progress, as far as the map says.
@@ -60,7 +60,7 @@ class Handshake:
         Registers have no numbers and no owner: a value that arrives late cannot be told from one
         of now, and what arrives later than this nothing here can keep out (docs/plc-maps.md).
         """
-        self._registers.clock.sleep(self._commit.timeout_s)
+        self._places.clock.sleep(self._commit.timeout_s)
 
     def carry_out(self, tool: int) -> None:
         """Have the PLC take over the values in the registers.
@@ -69,13 +69,13 @@ class Handshake:
             RejectedError: It refused; the request is taken back.
             OutcomeUnknownError: It did not answer in time; the request is taken back.
         """
-        commit, registers = self._commit, self._registers
+        commit, places = self._commit, self._places
         if commit.request is None:
-            registers.clock.sleep(commit.settle_s)
+            places.clock.sleep(commit.settle_s)
             return
         if commit.tool_number is not None:
-            registers.write(commit.tool_number.address, [tool])
-        registers.switch(commit.request, on=True)
+            places.tell(commit.tool_number, tool)
+        places.switch(commit.request, on=True)
         try:
             code = self._answered(commit.request)
         except RejectedError as error:  # of reading or resetting: the PLC may have acted
@@ -107,61 +107,61 @@ class Handshake:
     def fault(self) -> int | None:
         """Return the number of the present error, 0 for one without a number."""
         commit = self._commit
-        if commit.error is not None and not self._registers.is_on(commit.error):
+        if commit.error is not None and not self._places.is_on(commit.error):
             return None
         if commit.error_code is None:
             return None if commit.error is None else 0
-        code = self._registers.word(commit.error_code)
+        code = self._places.word(commit.error_code)
         return code if code or commit.error is not None else None
 
     def is_busy(self) -> bool:
         """Whether the PLC reports that it is busy."""
-        return self._registers.is_on(self._commit.busy)
+        return self._places.is_on(self._commit.busy)
 
-    def _answered(self, asked: Signal) -> int | None:
+    def _answered(self, asked: PlacedSignal) -> int | None:
         """Wait for the answer and withdraw the request.
 
         Returns:
             The number of an error that came instead of the answer, ``None`` for none.
         """
         code = self._answer(asked)
-        self._registers.switch(asked, on=False, kind=CommandClass.CALM)
+        self._places.switch(asked, on=False, kind=CommandClass.CALM)
         if code is None and self._commit.kind is CommitKind.COMMIT_BIT:
             self._let_go()
         return code
 
-    def _answer(self, asked: Signal) -> int | None:
+    def _answer(self, asked: PlacedSignal) -> int | None:
         timeout_s = self._commit.timeout_s
-        deadline = Deadline.after(self._registers.clock, timeout_s)
+        deadline = Deadline.after(self._places.clock, timeout_s)
         while True:
             code = self.fault()
-            if code is not None or self._registers.is_on(self._commit.answer):
+            if code is not None or self._places.is_on(self._commit.answer):
                 return code
             if deadline.expired:
                 with suppress(RobolinkError):  # the error raised below applies in any case
-                    self._registers.switch(asked, on=False, kind=CommandClass.CALM)
+                    self._places.switch(asked, on=False, kind=CommandClass.CALM)
                 raise self._unknown(
                     tr(
                         "The PLC did not answer the request within {timeout:g} s.",
                         timeout=timeout_s,
                     )
                 )
-            self._registers.clock.sleep(_POLL_S)
+            self._places.clock.sleep(_POLL_S)
 
     def _let_go(self) -> None:
         """Wait until the answer has gone with the request."""
         timeout_s = self._commit.timeout_s
-        deadline = Deadline.after(self._registers.clock, timeout_s)
-        while self._registers.is_on(self._commit.answer):
+        deadline = Deadline.after(self._places.clock, timeout_s)
+        while self._places.is_on(self._commit.answer):
             if deadline.expired:
                 raise self._unknown(
                     tr("Its done signal is still on {timeout:g} s later.", timeout=timeout_s)
                 )
-            self._registers.clock.sleep(_POLL_S)
+            self._places.clock.sleep(_POLL_S)
 
     def _hindrance(self) -> RobolinkError | None:
         """Return why the PLC cannot be asked now."""
-        registers = self._registers
+        places = self._places
         code = self.fault()
         if code is not None:
             return NotReadyError(
@@ -170,7 +170,7 @@ class Handshake:
                 code=code,
                 remedy=tr("Nothing was written. Clear it at the HMI."),
             )
-        if self.is_busy() or registers.is_on(self._commit.answer):
+        if self.is_busy() or places.is_on(self._commit.answer):
             return BusyError(
                 tr("The PLC is busy with another request."),
                 remedy=tr("Nothing was written. Wait until it has finished, then try again."),

@@ -1,14 +1,13 @@
 """The content of a slot, and how other content takes effect.
 
-From registers to tool offsets and back, and when two offsets are alike.
+From what stands at the places of a map to tool offsets and back, and when two offsets are alike.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 
 from robolink.controllers.plc_map.handshake import Handshake
-from robolink.controllers.plc_map.link import Registers
+from robolink.controllers.plc_map.places import Places
 from robolink.errors import (
     LimitError,
     OutcomeUnknownError,
@@ -24,40 +23,40 @@ from robolink.register_maps import (
     COMPONENTS,
     LREAL_TOLERANCE,
     AllZero,
-    MapSlot,
-    Number,
-    RegisterMap,
-    RegisterTable,
-    describe_place,
+    AnyMap,
+    Cells,
+    PlacedNumber,
+    PlacedSignal,
+    ToolSlot,
 )
 
-Words = dict[int, int]
-"""Registers of one table by address."""
+Slot = ToolSlot[PlacedNumber, PlacedSignal]
+"""Where a tool is, in a map of registers or of symbols."""
 
 
 class OffsetValues:
-    """What the registers of one map can hold."""
+    """What the places of one map can hold."""
 
-    def __init__(self, register_map: RegisterMap) -> None:
+    def __init__(self, register_map: AnyMap) -> None:
         self._map = register_map
 
-    def offset(self, slot: MapSlot, words: Words) -> ToolOffset | None:
-        """Return the tool that registers hold; ``None`` for zeros that mean none.
+    def offset(self, slot: Slot, cells: Cells) -> ToolOffset | None:
+        """Return the tool that stands there; ``None`` for zeros that mean none.
 
         Raises:
             RemoteProtocolError: They hold no tool.
         """
-        taken = [words[address] for n in slot.components.values() for address in n.registers]
+        taken = [cells[cell] for n in slot.components.values() for cell in n.cells]
         if not any(taken) and self._map.all_zero is not AllZero.TOOL:
             if self._map.all_zero is AllZero.UNDEFINED:
                 return None
             raise self._all_zero(slot)
-        return ToolOffset(*self.numbers(slot.components, words, largest_mm=self._map.largest_mm))
+        return ToolOffset(*self.numbers(slot.components, cells, largest_mm=self._map.largest_mm))
 
     def numbers(
         self,
-        components: Mapping[str, Number],
-        words: Words,
+        components: Mapping[str, PlacedNumber],
+        cells: Cells,
         *,
         largest_mm: float,
         largest_deg: float = 360.0,
@@ -69,24 +68,24 @@ class OffsetValues:
         """
         limits = dict.fromkeys("xyz", largest_mm) | dict.fromkeys("uvw", largest_deg)
         x, y, z, u, v, w = (
-            self._number(name, components[name], words, limits[name]) if name in components else 0.0
+            self._number(name, components[name], cells, limits[name]) if name in components else 0.0
             for name in COMPONENTS
         )
         return x, y, z, u, v, w
 
-    def registers(self, slot: MapSlot, offset: ToolOffset) -> Words:
-        """Return the registers that hold ``offset`` as nearly as they can.
+    def stored(self, slot: Slot, offset: ToolOffset) -> Cells:
+        """Return what stands for ``offset`` as nearly as it can.
 
         Raises:
             ToolError: A component is not 0 that the PLC does not have.
-            LimitError: A component is too large for its registers, or the map would not believe
+            LimitError: A component is too large for its place, or the map would not believe
                 them when it reads them back.
         """
-        words: Words = {}
+        cells: Cells = {}
         for name, value in zip(COMPONENTS, offset.components(), strict=True):
             number = slot.components.get(name)
             if number is not None:
-                words.update(zip(number.registers, self._encode(slot, name, value), strict=True))
+                cells.update(zip(number.cells, self._encode(slot, name, value), strict=True))
             elif value:
                 raise ToolError(
                     tr(
@@ -97,12 +96,12 @@ class OffsetValues:
                     ),
                     remedy=tr("Nothing was sent. Leave it out."),
                 )
-        self._require_believable(slot, words)
-        return words
+        self._require_believable(slot, cells)
+        return cells
 
-    def _require_believable(self, slot: MapSlot, words: Words) -> None:
-        """Refuse registers that the map reads as no tool, or as an impossible one."""
-        if not any(words.values()) and self._map.all_zero is not AllZero.TOOL:
+    def _require_believable(self, slot: Slot, cells: Cells) -> None:
+        """Refuse values that the map reads as no tool, or as an impossible one."""
+        if not any(cells.values()) and self._map.all_zero is not AllZero.TOOL:
             raise LimitError(
                 tr(
                     "Tool {tool} would be all zeros, which this map takes for {meaning}.",
@@ -117,7 +116,7 @@ class OffsetValues:
                 ),
             )
         try:
-            self.numbers(slot.components, words, largest_mm=self._map.largest_mm)
+            self.numbers(slot.components, cells, largest_mm=self._map.largest_mm)
         except RemoteProtocolError as error:
             raise LimitError(
                 listed(
@@ -127,13 +126,13 @@ class OffsetValues:
                 remedy=tr("Write 0 in place of so small a number."),
             ) from error
 
-    def rounded(self, slot: MapSlot, offset: ToolOffset) -> ToolOffset:
-        """Return the offset as the registers would store it; raises as :meth:`registers`."""
-        words = self.registers(slot, offset)
-        return ToolOffset(*self.numbers(slot.components, words, largest_mm=self._map.largest_mm))
+    def rounded(self, slot: Slot, offset: ToolOffset) -> ToolOffset:
+        """Return the offset as the PLC would store it; raises as :meth:`stored`."""
+        cells = self.stored(slot, offset)
+        return ToolOffset(*self.numbers(slot.components, cells, largest_mm=self._map.largest_mm))
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Return whether registers store both alike; undefined equals undefined only.
+        """Return whether the PLC stores both alike; undefined equals undefined only.
 
         Whole numbers: half a step; REAL: one unit in the last place; LREAL: 1e-9
         (docs/reference/rules.md 3).
@@ -145,7 +144,7 @@ class OffsetValues:
         pairs = zip(COMPONENTS, a.components(), b.components(), strict=True)
         return all(self._alike(name, first, second) for name, first, second in pairs)
 
-    def changed(self, slot: MapSlot, outcome: Words, wanted: Words) -> tuple[str, ...]:
+    def changed(self, slot: Slot, standing: Cells, wanted: Cells) -> tuple[str, ...]:
         """Return the components in which ``wanted`` differs from ``standing``.
 
         What is no number is another one.
@@ -155,8 +154,8 @@ class OffsetValues:
             for name, number in slot.components.items()
             if not self._alike(
                 name,
-                number.decode(tuple(outcome[address] for address in number.registers)),
-                number.decode(tuple(wanted[address] for address in number.registers)),
+                number.decode([standing[cell] for cell in number.cells]),
+                number.decode([wanted[cell] for cell in number.cells]),
             )
         )
 
@@ -168,8 +167,8 @@ class OffsetValues:
         slacks = [number.slack(value) for number in numbers for value in (a, b)]
         return abs(difference) <= max(slacks, default=0.0) + LREAL_TOLERANCE
 
-    def _number(self, name: str, number: Number, words: Words, limit: float) -> float:
-        value = number.decode(tuple(words[address] for address in number.registers))
+    def _number(self, name: str, number: PlacedNumber, cells: Cells, limit: float) -> float:
+        value = number.decode([cells[cell] for cell in number.cells])
         if not number.is_absurd(value) and abs(value) <= limit:
             return value
         if not number.is_absurd(value) and name not in ANGLES and limit == self._map.largest_mm:
@@ -183,7 +182,7 @@ class OffsetValues:
                     limit=limit,
                 ),
                 remedy=tr(
-                    "Compare address, type, scale and word_order with the PLC, or raise largest_mm."
+                    "Compare place, type, scale and word_order with the PLC, or raise largest_mm."
                 ),
             )
         raise RemoteProtocolError(
@@ -194,20 +193,20 @@ class OffsetValues:
                 value=value,
             ),
             remedy=tr(
-                "Compare address, type and word_order in the map with the PLC's register list; "
+                "Compare place, type and word_order in the map with the PLC's own list; "
                 "'robolink expert plc check-map' shows all values."
             ),
         )
 
-    def _encode(self, slot: MapSlot, name: str, value: float) -> tuple[int, ...]:
+    def _encode(self, slot: Slot, name: str, value: float) -> Sequence[float]:
         number = slot.components[name]
         limit = 360.0 if name in ANGLES else self._map.largest_mm
         try:
-            words = number.encode(value)
+            stored = number.encode(value)
         except OverflowError:
-            words = None
-        if words is not None and abs(value) <= limit:
-            return words
+            stored = None
+        if stored is not None and abs(value) <= limit:
+            return stored
         raise LimitError(
             tr(
                 "{axis} = {value:g} for tool {tool} is more than {place} may hold "
@@ -222,10 +221,10 @@ class OffsetValues:
             remedy=tr("Check the value, then type, scale and largest_mm in the map."),
         )
 
-    def _all_zero(self, slot: MapSlot) -> RemoteProtocolError:
+    def _all_zero(self, slot: Slot) -> RemoteProtocolError:
         return RemoteProtocolError(
             tr(
-                "All registers of tool {tool} are zero, as after a lost link.",
+                "All values of tool {tool} are zero, as after a lost link.",
                 tool=slot.tool,
             ),
             remedy=tr(
@@ -235,100 +234,90 @@ class OffsetValues:
         )
 
 
-def runs(words: Words) -> Iterator[tuple[int, list[int]]]:
-    """Return the stretches of neighbouring registers, each with its first address."""
-    for _, stretch in groupby(enumerate(sorted(words)), key=lambda pair: pair[1] - pair[0]):
-        addresses = [address for _, address in stretch]
-        yield addresses[0], [words[address] for address in addresses]
-
-
 @dataclass(frozen=True, slots=True)
 class SlotContent:
     """The present or the intended content of a slot.
 
     Attributes:
-        words: Registers by address; none when only the flag is to change.
+        cells: What stands where; nothing when only the flag is to change.
         defined: The flag of a tool that is defined; True where there is none to write.
     """
 
-    words: Words
+    cells: Cells
     defined: bool = True
 
     def is_part_of(self, other: "SlotContent") -> bool:
         """Whether ``other`` contains all of this."""
-        return self.defined == other.defined and self.words.items() <= other.words.items()
+        return self.defined == other.defined and self.cells.items() <= other.cells.items()
 
 
 class Slots:
     """Writes the slots of one map, and has the PLC take them over.
 
     Attributes:
-        values: From registers to offsets and back.
+        values: From cells to offsets and back.
         handshake: How the PLC is told.
     """
 
-    def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
-        self._registers = registers
+    def __init__(self, places: Places, register_map: AnyMap) -> None:
+        self._places = places
         self._map = register_map
         self.values = OffsetValues(register_map)
-        self.handshake = Handshake(registers, register_map.commit)
+        self.handshake = Handshake(places, register_map.commit)
 
-    def read(self, slot: MapSlot) -> ToolOffset | None:
+    def read(self, slot: Slot) -> ToolOffset | None:
         """Read a tool, ``None`` when it is undefined."""
-        if slot.defined is not None and not self._registers.is_on(slot.defined):
+        if slot.defined is not None and not self._places.is_on(slot.defined):
             return None
-        return self.values.offset(slot, self._words(slot))
+        return self.values.offset(slot, self._places.stable(slot.components))
 
-    def content(self, slot: MapSlot, offset: ToolOffset | None) -> SlotContent:
+    def content(self, slot: Slot, offset: ToolOffset | None) -> SlotContent:
         """Return the content for an offset, or for no tool.
 
         Raises:
             ToolError: This slot cannot hold it; nothing was sent.
-            LimitError: A component is too large for its registers; nothing was sent.
+            LimitError: A component is too large for its place; nothing was sent.
         """
         if offset is not None:
-            return SlotContent(self.values.registers(slot, offset))
+            return SlotContent(self.values.stored(slot, offset))
         if _has_flag(slot):
             return SlotContent({}, defined=False)
         if slot.defined is None and self._map.all_zero is AllZero.UNDEFINED:
-            addresses = (a for number in slot.components.values() for a in number.registers)
-            return SlotContent(dict.fromkeys(addresses, 0))
+            zeros = {
+                cell: stored
+                for number in slot.components.values()
+                for cell, stored in zip(number.cells, number.encode(0.0), strict=True)
+            }
+            return SlotContent(zeros)
         raise ToolError(
             tr("Tool {tool} of this PLC cannot be made undefined.", tool=slot.tool),
             remedy=tr("Write another offset; or zeros, if zeros mean no tool on this machine."),
         )
 
-    def changed(self, slot: MapSlot, content: SlotContent) -> tuple[str, ...]:
-        """Return which components other registers than now would stand for."""
-        if not content.words:
+    def changed(self, slot: Slot, content: SlotContent) -> tuple[str, ...]:
+        """Return which components would read otherwise than now."""
+        if not content.cells:
             return ()
-        return self.values.changed(slot, self._words(slot), content.words)
+        return self.values.changed(slot, self._places.stable(slot.components), content.cells)
 
-    def requests(self, slot: MapSlot, content: SlotContent) -> tuple[str, ...]:
+    def requests(self, slot: Slot, content: SlotContent) -> tuple[str, ...]:
         """Return all that :meth:`bring_into_force` writes, in words and in this order."""
-        requests = [
-            tr(
-                "write {place}: {values}",
-                place=describe_place(RegisterTable.HOLDING, address),
-                values=" ".join(f"{value:04X}" for value in values),
-            )
-            for address, values in runs(content.words)
-        ]
+        requests = [*self._places.write_requests(content.cells)]
         if slot.defined is not None and slot.defined.writable:
             place = slot.defined.place
             on, off = tr("switch {place} on", place=place), tr("switch {place} off", place=place)
             requests.append(on if content.defined else off)
         return (*requests, *self.handshake.requests(slot.tool))
 
-    def bring_into_force(self, slot: MapSlot, content: SlotContent) -> None:
+    def bring_into_force(self, slot: Slot, content: SlotContent) -> None:
         """Write ``content``, then ask the PLC; after a refusal the former content is restored.
 
         Raises:
             RejectedError: The PLC refused; nothing has changed.
-            OutcomeUnknownError: It did not answer, or the registers could not be restored.
+            OutcomeUnknownError: It did not answer, or the former content could not be restored.
         """
         before = self._stored(slot)
-        kept = SlotContent({a: before.words[a] for a in content.words}, before.defined)
+        kept = SlotContent({a: before.cells[a] for a in content.cells}, before.defined)
 
         def write_and_ask() -> None:
             self._write(slot, content)
@@ -336,8 +325,8 @@ class Slots:
 
         self._or_put_back(slot, kept, write_and_ask)
 
-    def take_over(self, slot: MapSlot, before: ToolOffset | None) -> None:
-        """Ask the PLC once to take over the registers; raises as :meth:`bring_into_force`.
+    def take_over(self, slot: Slot, before: ToolOffset | None) -> None:
+        """Ask the PLC once to take over what stands there; raises as :meth:`bring_into_force`.
 
         Args:
             slot: The slot.
@@ -346,18 +335,18 @@ class Slots:
         kept = self.content(slot, before)
         self._or_put_back(slot, kept, lambda: self.handshake.carry_out(slot.tool))
 
-    def _or_put_back(self, slot: MapSlot, kept: SlotContent, act: Callable[[], None]) -> None:
-        """Act; if it is refused or stopped, let the registers show the active values again."""
+    def _or_put_back(self, slot: Slot, kept: SlotContent, act: Callable[[], None]) -> None:
+        """Act; if it is refused or stopped, let the PLC show the active values again."""
         try:
             act()
         except (RejectedError, StoppedError) as error:
-            with self._registers.latch.putting_back(slot.tool):
+            with self._places.latch.putting_back(slot.tool):
                 restored = self._restored(slot, kept)
             if not restored:
                 raise OutcomeUnknownError(
                     listed(
                         tr(
-                            "robolink could not restore the registers of tool {tool} after this:",
+                            "robolink could not restore the values of tool {tool} after this:",
                             tool=slot.tool,
                         ),
                         [error.what],
@@ -367,29 +356,25 @@ class Slots:
                 ) from error
             raise
 
-    def _restored(self, slot: MapSlot, kept: SlotContent) -> bool:
+    def _restored(self, slot: Slot, kept: SlotContent) -> bool:
         """Restore ``kept`` where it is not there, with one write; return whether it is there."""
-        if kept.is_part_of(self._stored(slot)):
-            return True
         try:
+            if kept.is_part_of(self._stored(slot)):
+                return True
             self._write(slot, kept)
-        except RejectedError:
+            return kept.is_part_of(self._stored(slot))
+        except RejectedError:  # of reading, too: then nothing shows what stands there
             return False
-        return kept.is_part_of(self._stored(slot))
 
-    def _write(self, slot: MapSlot, content: SlotContent) -> None:
-        for address, values in runs(content.words):
-            self._registers.write(address, values)
+    def _write(self, slot: Slot, content: SlotContent) -> None:
+        self._places.write(content.cells)
         if slot.defined is not None and slot.defined.writable:
-            self._registers.switch(slot.defined, content.defined)
+            self._places.switch(slot.defined, content.defined)
 
-    def _stored(self, slot: MapSlot) -> SlotContent:
-        flagged = _has_flag(slot) and not self._registers.is_on(slot.defined)
-        return SlotContent(self._words(slot), defined=not flagged)
-
-    def _words(self, slot: MapSlot) -> Words:
-        return dict(zip(slot.span, self._registers.read_twice(slot.table, slot.span), strict=True))
+    def _stored(self, slot: Slot) -> SlotContent:
+        flagged = _has_flag(slot) and not self._places.is_on(slot.defined)
+        return SlotContent(self._places.stable(slot.components), defined=not flagged)
 
 
-def _has_flag(slot: MapSlot) -> bool:
+def _has_flag(slot: Slot) -> bool:
     return slot.defined is not None and slot.defined.writable

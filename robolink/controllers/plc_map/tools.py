@@ -1,9 +1,9 @@
-"""The tool table of a PLC that keeps offsets in registers of its own.
+"""The tool table of a PLC that keeps offsets in registers or symbols of its own.
 
 Settles what an earlier process left open.
 
 By reading; and where there is a handshake, by asking the PLC once more to take over what
-stands in its registers, which changes nothing if it did so before.
+stands at the places of the map, which changes nothing if it did so before.
 """
 
 from collections.abc import Collection, Sequence
@@ -17,7 +17,7 @@ from robolink.controllers.preserving import Preserver
 from robolink.controllers.resolving import MarkerResolver, examine_write
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import ToolWrite
-from robolink.errors import RejectedError, ToolError
+from robolink.errors import RejectedError, RemoteProtocolError
 from robolink.messages import known_names, tr
 from robolink.model import (
     PROOFS,
@@ -52,9 +52,9 @@ class RegisterToolTable(ToolTableCore):
     def __init__(self, plc: MappedPlc) -> None:
         super().__init__(plc)
         self._plc = plc
-        self._registers = plc.registers
+        self._places = plc.places
         self._map = plc.register_map
-        self._slots = Slots(plc.registers, plc.register_map)
+        self._slots = Slots(plc.places, plc.register_map)
 
     @property
     def handshake(self) -> Handshake:
@@ -80,11 +80,7 @@ class RegisterToolTable(ToolTableCore):
         super().require_writable(tool)
         with self._plc.asked(tr("tool {tool}", tool=tool)):
             self._plc.require_known_place(tool)
-        if not self._map.slots[tool].table.writable:
-            raise ToolError(
-                tr("Tool {tool} is in input registers, which are read-only.", tool=tool),
-                remedy=tr("Change it at the HMI, or map holding registers."),
-            )
+        self._places.require_writable(self._map.slots[tool])
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Refuse, as :meth:`select` does."""
@@ -127,8 +123,8 @@ class RegisterToolTable(ToolTableCore):
         if entry is not None and self.same(now, known):
             return ""
         return tr(
-            "The registers of tool {tool} hold {now}; on record is {known}. Only the HMI shows "
-            "which of the two the machine uses: the PLC may not have accepted its registers yet.",
+            "The PLC shows {now} for tool {tool}; on record is {known}. Only the HMI shows "
+            "which of the two the machine uses: the PLC may not have accepted what it shows.",
             tool=tool,
             now=describe_offset(now),
             known=tr("nothing") if entry is None else describe_offset(known),
@@ -192,7 +188,7 @@ class RegisterToolTable(ToolTableCore):
 
     def _selected(self) -> int | None:
         named = self._map.selected
-        return None if named is None else self._registers.word(named)
+        return None if named is None else self._places.word(named)
 
     def _select_request(self, tool: int) -> str:
         return tr("tool {tool}", tool=tool)
@@ -254,9 +250,15 @@ class _RegisterWrite(ToolWrite):
 
         Registers have no proof of their word order, and numbers in another order may be those of
         a tool (docs/reference/faults.md F33): so the probe is compared behind them.
+
+        Raises:
+            RemoteProtocolError: The PLC refuses to show it; that undoes no write.
         """
-        stored = self._slots.read(self._slot)
-        self._plc.require_probe()
+        try:
+            stored = self._slots.read(self._slot)
+            self._plc.require_probe()
+        except RejectedError as error:
+            raise RemoteProtocolError(error.what, remedy=error.remedy) from error
         return stored
 
 
@@ -305,9 +307,7 @@ class RegisterResolver(MarkerResolver):
         if finding.verdict is Verdict.DONE:
             holds = finding.sentence
         else:
-            holds = tr(
-                "The registers of tool {tool} hold the old value.", tool=marker.details["tool"]
-            )
+            holds = tr("The PLC shows the old value for tool {tool}.", tool=marker.details["tool"])
         sentence = tr("{holds} robolink could not confirm that the PLC accepted it.", holds=holds)
-        action = tr("ask the PLC again to accept the values in the registers")
+        action = tr("ask the PLC again to accept the values that it shows")
         return replace(finding, verdict=Verdict.NOT_FINISHED, sentence=sentence, action=action)

@@ -337,7 +337,9 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         RobolinkError: As :func:`open_softmotion`, and as the link.
     """
     url, kinematics = _own_kinematics(url)
-    link = open_mailbox_link(url, timeout_s=terms.timeout_s, clock=terms.clock)
+    link = open_mailbox_link(
+        url, timeout_s=terms.timeout_s, clock=terms.clock, password=terms.password
+    )
     return open_softmotion(
         link,
         outcomes=terms.record_of(link),

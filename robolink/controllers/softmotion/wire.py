@@ -26,6 +26,7 @@ from robolink.controllers.softmotion.heartbeat import (
 )
 from robolink.errors import (
     BusyError,
+    RejectedError,
     RemoteProtocolError,
     RobolinkError,
     TransportClosedError,
@@ -132,7 +133,10 @@ class MotionTracker:
 
 def has_ended(state: int) -> bool:
     """Whether a state is one of the three ends; numbers of a newer PLC are not."""
-    return state in (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
+    return state in _ENDS
+
+
+_ENDS: Final = (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
 
 
 _LOG: Final = PackageLog(__package__)
@@ -368,12 +372,17 @@ class MailboxWire:
     def _beat_if_due(self, *, ahead: bool = False) -> None:
         """Write the heartbeat alone, if we own the mailbox and it is due.
 
-        While something is unfinished only who waits on it does (:meth:`attended`).
+        While something is unfinished only who waits on it does (:meth:`attended`). One that is
+        refused holds no stop back: a stop needs none.
         """
         busy = self.motions.unfinished
         now_ns = self.clock.now_ns()
         if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy, ahead=ahead):
-            self._asked(lambda: self._link.beat(self.next_beat()))
+            try:
+                self._asked(lambda: self._link.beat(self.next_beat()))
+            except RejectedError:
+                if not self.latch.closed:
+                    raise
 
     def _asked(self, exchange: Callable[[], T], *, awaited: bool = True) -> T:
         """Do an exchange up to three times; only once more when its whole deadline has passed."""

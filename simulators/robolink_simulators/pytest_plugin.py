@@ -248,7 +248,7 @@ def softmotion_sim(request: pytest.FixtureRequest, softmotion_factory: Factory) 
     """A simulated SoftMotion PLC in this process.
 
     Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-tcp``,
-    ``modbus-rtu`` (not on Windows) and ``can``.
+    ``modbus-rtu`` (not on Windows), ``can``, ``opcua`` and ``opcua-secured``.
     """
     return softmotion_factory(medium=getattr(request, "param", "sim"))
 
@@ -257,7 +257,8 @@ def softmotion_sim(request: pytest.FixtureRequest, softmotion_factory: Factory) 
 def plc_sim(request: pytest.FixtureRequest, plc_factory: Factory) -> "SimulatedCell":
     """A simulated PLC with a register map, on Modbus TCP.
 
-    Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-rtu``.
+    Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-rtu``; a map of symbols
+    with ``opcua`` and ``opcua-secured``.
     """
     return plc_factory(medium=getattr(request, "param", "modbus-tcp"))
 

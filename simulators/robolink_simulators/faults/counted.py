@@ -1,8 +1,9 @@
 """Faults that wait for their request. Counted, never rolled."""
 
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import replace
 from heapq import heappop, heappush
-from typing import Final, Generic, Protocol, TypeVar, cast
+from typing import Any, Final, Generic, Protocol, TypeVar, cast
 
 from robolink_simulators.device.wire_time import late_random
 from robolink_simulators.faults.links import AnyAction, LinkKind, links_of, require_possible
@@ -146,6 +147,21 @@ class CountedFaults(Generic[AnyFault]):
         """What has not fired yet, or continues, in the order in which it was planned."""
         waiting = [item for group in self._groups.values() for item in group.due]
         return tuple(fault for _, _, fault in sorted(waiting, key=lambda item: item[1]))
+
+    def take_back(self, fault: AnyFault, request: str = "") -> None:
+        """Let a fault that was handed out, but did not happen, wait for the next request.
+
+        Args:
+            fault: Which.
+            request: What to wait for if the fault counts all requests.
+        """
+        if fault not in self.fired:  # forgotten meanwhile
+            return
+        self.fired.remove(fault)
+        self.times_fired -= 1
+        if not fault.every:  # otherwise the fault recurs by itself
+            waiting: Any = fault
+            self.add(replace(waiting, on_exchange=0, match=fault.match or request))
 
     def take(self, request: str, link: LinkKind | None = None) -> tuple[AnyFault, ...]:
         """Count one request and return the faults that it meets, in the order of planning.

@@ -33,6 +33,7 @@ _OF_WRITES: Final = frozenset(
         PlcFaultAction.GARBLE_WRITE,
         PlcFaultAction.TEAR_WRITE,
         PlcFaultAction.IGNORE_WRITE,
+        PlcFaultAction.READ_ONLY,
     }
 )
 _OF_READS: Final = frozenset(
@@ -43,12 +44,21 @@ _OF_READS: Final = frozenset(
         PlcFaultAction.ZERO_REPLY,
         PlcFaultAction.LOSE_SEGMENT,
         PlcFaultAction.WRONG_TOGGLE,
+        PlcFaultAction.TEAR_ARRAY,
+        PlcFaultAction.SHORT_ARRAY,
     }
 )
 
-ONLY_BY_NAME: Final = frozenset({FaultAction.MODBUS_EXCEPTION, PlcFaultAction.MODBUS_EXCEPTION})
-"""Faults that are drawn only if named. They were added later, and a seed without named faults must
-still draw the same ones.
+ONLY_BY_NAME: Final = frozenset(
+    {
+        FaultAction.MODBUS_EXCEPTION,
+        PlcFaultAction.MODBUS_EXCEPTION,
+        FaultAction.EXPIRED_CERTIFICATE,
+        PlcFaultAction.EXPIRED_CERTIFICATE,
+    }
+)
+"""Faults that are drawn only if named. The exceptions were added later, and a seed without named
+faults must still draw the same ones; with an expired certificate nobody would come in any more.
 """
 
 Action = TypeVar("Action", FaultAction, PlcFaultAction)
@@ -62,7 +72,7 @@ class FaultRates:
         rate: Faults per exchange, 0 to 1.
         exchanges: Over how many exchanges, at most 1,000,000.
         actions: Which faults are drawn from; none at all means all that the link can have but
-            MODBUS_EXCEPTION.
+            MODBUS_EXCEPTION and EXPIRED_CERTIFICATE.
         match: As of a fault: only requests that contain it are counted.
 
     Raises:

@@ -85,6 +85,38 @@ class PlcFaultAction(Enum):
     """CAN: the bus returns the client's own frame (F51)."""
     MODBUS_EXCEPTION = auto()
     """The request is not carried out, and the answer is the Modbus exception ``code``."""
+    TEAR_ARRAY = auto()
+    """OPC UA: the elements of an array from ``position`` on are from ``seconds`` later; from the
+    PLC's next cycle if no time is given. With an odd ``bit`` those before it are. The fault waits
+    for an answer that is a mixture then (F31).
+    """
+    TEAR_NODES = auto()
+    """OPC UA: the variables of a request from ``position`` on are from ``seconds`` later, from the
+    PLC's next cycle if no time is given. With an odd ``bit`` those before it are. The fault waits
+    for an answer that is a mixture then (F31).
+    """
+    WRONG_TYPE = auto()
+    """OPC UA: the values are of another type, as REAL for LREAL; a write is refused with
+    BadTypeMismatch.
+    """
+    SHORT_ARRAY = auto()
+    """OPC UA: arrays in the answer end before element ``position``, before the last one if none is
+    given.
+    """
+    READ_ONLY = auto()
+    """OPC UA: the write is refused with BadNotWritable."""
+    OUT_OF_SERVICE = auto()
+    """OPC UA: the request is not carried out; each variable is answered with BadOutOfService."""
+    LOSE_SESSION = auto()
+    """OPC UA: the server has forgotten the session. Neither the request nor any after it is carried
+    out.
+    """
+    DROP_CHANNEL = auto()
+    """OPC UA: the request is carried out; then the server closes the secure channel."""
+    EXPIRED_CERTIFICATE = auto()
+    """OPC UA: from now on the server shows a certificate that ended yesterday. Open connections
+    stay.
+    """
 
 
 Order = Literal["low_first", "high_first", "pairs_swapped", "halves_swapped"]

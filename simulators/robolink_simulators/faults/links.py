@@ -21,9 +21,11 @@ class LinkKind(StrEnum):
     PLC_TCP = "plc+modbus-tcp"
     PLC_RTU = "plc+modbus-rtu"
     PLC_SIM = "plc+sim"
+    PLC_OPCUA = "plc+opcua"
     MODBUS_TCP = "softmotion+modbus-tcp"
     MODBUS_RTU = "softmotion+modbus-rtu"
     CAN = "softmotion+can"
+    OPCUA = "softmotion+opcua"
     MAILBOX_SIM = "softmotion+sim"
 
 
@@ -40,13 +42,22 @@ class FaultNotPossibleError(NotNowError):
 
 
 EPSON_LINKS: Final = frozenset({LinkKind.EPSON_TCP, LinkKind.EPSON_SERIAL, LinkKind.EPSON_SIM})
-PLC_LINKS: Final = frozenset({LinkKind.PLC_TCP, LinkKind.PLC_RTU, LinkKind.PLC_SIM})
+PLC_LINKS: Final = frozenset(
+    {LinkKind.PLC_TCP, LinkKind.PLC_RTU, LinkKind.PLC_OPCUA, LinkKind.PLC_SIM}
+)
 MAILBOX_LINKS: Final = frozenset(
-    {LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU, LinkKind.CAN, LinkKind.MAILBOX_SIM}
+    {
+        LinkKind.MODBUS_TCP,
+        LinkKind.MODBUS_RTU,
+        LinkKind.CAN,
+        LinkKind.OPCUA,
+        LinkKind.MAILBOX_SIM,
+    }
 )
 _LINES: Final = frozenset({LinkKind.EPSON_SERIAL, LinkKind.PLC_RTU, LinkKind.MODBUS_RTU})
 _STREAMS: Final = EPSON_LINKS | PLC_LINKS
-_FRAMED: Final = frozenset({LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU})
+_OPCUA: Final = frozenset({LinkKind.OPCUA, LinkKind.PLC_OPCUA})
+_FRAMED: Final = frozenset({LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU, LinkKind.OPCUA})
 
 _OF_EPSON: Final = frozenset(
     {
@@ -77,6 +88,9 @@ _OF_CAN: Final = frozenset(
         PlcFaultAction.ECHO,
     }
 )
+_OF_MODBUS: Final[frozenset[AnyAction]] = frozenset(
+    {FaultAction.MODBUS_EXCEPTION, PlcFaultAction.MODBUS_EXCEPTION}
+)
 _OF_FRAMES: Final = frozenset(
     {
         PlcFaultAction.MODBUS_EXCEPTION,
@@ -85,9 +99,26 @@ _OF_FRAMES: Final = frozenset(
         PlcFaultAction.SPLIT_REPLY,
     }
 )
+OF_OPCUA: Final[frozenset[AnyAction]] = frozenset(
+    family[name]
+    for family in (FaultAction, PlcFaultAction)
+    for name in (
+        "TEAR_ARRAY",
+        "TEAR_NODES",
+        "WRONG_TYPE",
+        "SHORT_ARRAY",
+        "READ_ONLY",
+        "OUT_OF_SERVICE",
+        "LOSE_SESSION",
+        "DROP_CHANNEL",
+        "EXPIRED_CERTIFICATE",
+    )
+)
+"""Faults that each family has for OPC UA; the simulated server itself does them."""
+
 _NOT_ON_CAN: Final = frozenset(
     {
-        PlcFaultAction.SHIFT_MAP,  # objects have numbers but no neighbours
+        PlcFaultAction.SHIFT_MAP,
         PlcFaultAction.RESET,
         PlcFaultAction.HALF_OPEN,
     }
@@ -96,10 +127,16 @@ _NOT_ON_CAN: Final = frozenset(
 
 def links_of(action: AnyAction) -> frozenset[LinkKind]:
     """Return the links on which a fault can happen."""
+    if action in OF_OPCUA:
+        return _OPCUA & (PLC_LINKS if isinstance(action, FaultAction) else MAILBOX_LINKS)
     if isinstance(action, FaultAction):
         links = EPSON_LINKS if action in _OF_EPSON else _STREAMS
         if action is FaultAction.MODBUS_EXCEPTION:
             links = PLC_LINKS
+        if action is FaultAction.TEAR_WRITE:
+            links = frozenset({LinkKind.PLC_OPCUA})
+        if action is FaultAction.RESTART:
+            links |= {LinkKind.PLC_OPCUA}
     elif action in _OF_CAN:
         links = frozenset({LinkKind.CAN})
     elif action in _OF_FRAMES:
@@ -108,6 +145,8 @@ def links_of(action: AnyAction) -> frozenset[LinkKind]:
         links = MAILBOX_LINKS - {LinkKind.CAN}
     else:
         links = MAILBOX_LINKS
+    if action in _OF_MODBUS or action is PlcFaultAction.SHIFT_MAP:
+        links -= _OPCUA  # symbols have names but no neighbours
     return links - _LINES if action in _OF_CONNECTIONS else links
 
 

@@ -5,11 +5,12 @@ here are the plainest that each handshake allows (assumed).
 """
 
 from robolink_simulators.plc.device import PlcSimulator
-from robolink_simulators.plc.serving import PlcHost, serve_plc, serve_plc_line
+from robolink_simulators.plc.serving import PlcHost, serve_plc, serve_plc_line, serve_plc_opcua
 
 __all__ = [
     "PlcHost",
     "PlcSimulator",
     "serve_plc",
     "serve_plc_line",
+    "serve_plc_opcua",
 ]

@@ -1,12 +1,12 @@
 """The simulated PLC: a program behind a Modbus server."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from robolink.model import ToolOffset
-from robolink.register_maps import RegisterMap, RegisterTable
+from robolink.register_maps import RegisterMap, RegisterTable, SymbolMap
 from robolink.timing import NS_PER_S
 from robolink_simulators.device.hosted import HostedDevice
 from robolink_simulators.device.wire_record import MotionLog
@@ -22,7 +22,8 @@ from robolink_simulators.hosting.modbus_frames import (
     PlcRequest,
     TcpFrames,
 )
-from robolink_simulators.plc.program import OutsideError, PlcProgram
+from robolink_simulators.plc.memory import Memory, OutsideError, SymbolMemory
+from robolink_simulators.plc.program import PlcProgram
 
 
 class MappedPlcPanel:
@@ -50,6 +51,8 @@ class MappedPlcPanel:
         with self._plc.acting():
             self._plc.cut_links()
 
+
+Answer = TypeVar("Answer")
 
 _SILENCE_NS: Final = 50_000_000
 """Silence in ns that ends a frame on a line: 3.5 characters (Modbus over serial line 1.02,
@@ -169,9 +172,10 @@ class PlcSimulator(HostedDevice):
             :data:`MOST_WRITES`.
         panel: What a person, or the machine's own program, can do.
         starts: How often it was switched on.
+        cuts: How often all its connections were ended.
 
     Args:
-        register_map: The map to serve.
+        register_map: The map to serve, of registers over Modbus or of symbols over OPC UA.
         unit: The unit identifier; another one is answered with exception 11 over TCP, and not
             at all on a serial line.
         seed: Other tools.
@@ -195,7 +199,7 @@ class PlcSimulator(HostedDevice):
 
     def __init__(
         self,
-        register_map: RegisterMap,
+        register_map: RegisterMap | SymbolMap,
         *,
         unit: int = 1,
         seed: int = 1,
@@ -209,10 +213,14 @@ class PlcSimulator(HostedDevice):
         self.faults = FaultPlan(seed=seed, links=PLC_LINKS)
         self.panel = MappedPlcPanel(self)
         self._links: list[PlcLink] = []
+        self._planned: list[tuple[int, Callable[[], None]]] = []
+        self.cuts = 0
         self._make()
 
     def _make(self) -> None:
-        self.program = PlcProgram(self.register_map, self.seed)
+        used = self.register_map
+        memory = SymbolMemory(used) if isinstance(used, SymbolMap) else Memory(used)
+        self.program: PlcProgram[Any] = PlcProgram(used, memory, self.seed)
         self.writes: list[str] = []
         self.starts = 1
 
@@ -241,8 +249,52 @@ class PlcSimulator(HostedDevice):
 
     def cut_links(self) -> None:
         """End every connection; whoever calls it is acting."""
+        self.cuts += 1
         for link in self._links:
             link.cut()
+
+    def act_after(self, seconds: float, act: Callable[[], None]) -> None:
+        """Do something some time from now, not before the end of the present request."""
+        self._planned.append((self.now_ns + max(1, round(seconds * NS_PER_S)), act))
+
+    def exchange(self, shown: str, carry_out: Callable[[], Answer]) -> Answer:
+        """Carry a request out between its hooks, and count it.
+
+        Args:
+            shown: What it is.
+            carry_out: Does it, and returns what is answered.
+
+        Returns:
+            The answer. What a hook raises goes to the caller; the request is carried out before.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink.register_maps import load_map
+            >>> from robolink_simulators.plc import PlcSimulator
+            >>> from robolink_simulators.testkit.operator import written_map
+            >>> plc = PlcSimulator(load_map(written_map(Path.cwd())))
+            >>> plc.exchange("fc4 0", lambda: (7,)), plc.exchanges
+            ((7,), 1)
+        """
+        self._requests += 1
+        number = self._requests
+        try:
+            if self.on_request is not None:
+                self.on_request(number, shown)
+        finally:
+            answer = carry_out()
+        self.exchanges += 1
+        self.log.add(self.now_ns, "<", shown)
+        if self.on_reply is not None:
+            self.on_reply(number, shown)
+        return answer
+
+    def note_write(self, shown: str) -> None:
+        """Note a writing request that was carried out, and let the program react."""
+        self.writes.append(shown)
+        if len(self.writes) > 2 * MOST_WRITES:
+            del self.writes[:-MOST_WRITES]
+        self.program.written(self.now_ns)
 
     def connect(self, now_ns: int, frames: Frames | None = None) -> PlcLink:
         """Accept one client, over TCP unless its frames are named."""
@@ -258,17 +310,32 @@ class PlcSimulator(HostedDevice):
             ahead = [change for change in self._changes() if before_ns < change < now_ns]
             self.now_ns = min(ahead, default=max(before_ns, now_ns))
             self.program.advance(self.now_ns)
+            self._act_if_due()
             for link in self._links:
                 link.catch_up()
             if not ahead:
                 return
+
+    def _act_if_due(self) -> None:
+        due = [act for at_ns, act in self._planned if at_ns <= self.now_ns]
+        self._planned = [one for one in self._planned if one[0] > self.now_ns]
+        self._stepping = True
+        try:
+            for act in due:
+                act()
+        finally:
+            self._stepping = False
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
         return min(self._changes(), default=None)
 
     def _changes(self) -> list[int]:
-        changes = (self.program.next_change(), *(link.next_change() for link in self._links))
+        changes = (
+            *(at_ns for at_ns, _ in self._planned),
+            self.program.next_change(),
+            *(link.next_change() for link in self._links),
+        )
         return [change for change in changes if change is not None]
 
     def serve(
@@ -312,20 +379,13 @@ class PlcSimulator(HostedDevice):
             return []
         ignored = FaultAction.IGNORE_WRITE in actions
         refusal = actions.get(FaultAction.MODBUS_EXCEPTION)
-        self._requests += 1
-        number = self._requests
-        try:
-            if self.on_request is not None:
-                self.on_request(number, request.words)
-        finally:
-            if refusal is None:
-                reply = self._answer(request, frames, ignored=ignored)
-            else:
-                reply = frames.refusal(request, refusal.code)
-        self.exchanges += 1
-        self.log.add(self.now_ns, "<", request.words)
-        if self.on_reply is not None:
-            self.on_reply(number, request.words)
+
+        def carried_out() -> bytes:
+            if refusal is not None:
+                return frames.refusal(request, refusal.code)
+            return self._answer(request, frames, ignored=ignored)
+
+        reply = self.exchange(request.words, carried_out)
         leaving = self.faults.departures(reply, met, after_s=self.answer_s)
         if (again := actions.get(FaultAction.DUPLICATE_REQUEST)) is not None:
             late_s = again.seconds + self.answer_s
@@ -349,24 +409,19 @@ class PlcSimulator(HostedDevice):
             return frames.refusal(request, ILLEGAL_ADDRESS)
         if request.values is not None and not ignored:
             self.program.memory.write(request.table, request.address, request.values)
-            self.writes.append(request.words)
-            if len(self.writes) > 2 * MOST_WRITES:
-                del self.writes[:-MOST_WRITES]
-            self.program.written(self.now_ns)
+            self.note_write(request.words)
         return frames.answer(request, found)
 
     def _truth(self) -> dict[str, Any]:
         selected = self.register_map.selected
         return {
             "stored": {str(tool): _offset(held) for tool, held in self.program.in_force.items()},
-            "selected_tool": selected
-            and self.program.memory.read(
-                selected.table, range(selected.address, selected.address + 1)
-            )[0],
+            "selected_tool": selected and self.program.memory.word(selected),
         }
 
     def _renew(self) -> None:
         self.cut_links()
+        self._planned.clear()
         self.faults.forget()
         self._make()
 

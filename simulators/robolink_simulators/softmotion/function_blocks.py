@@ -1,13 +1,13 @@
 """The outputs of a function block that was executed once."""
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 
 from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.smc_errors import SmcError
 
 
-class BlockState(Enum):
+class BlockState(StrEnum):
     """The state of an execution; one at a time (PLCopen, docs/reference/softmotion.md 2.5)."""
 
     BUSY = "busy"

@@ -15,7 +15,7 @@ from robolink_simulators.cell.workplace import MOUNTED_TOOL
 from robolink_simulators.cell.world_parameters import WorldParameters, parameters_from_text
 from robolink_simulators.faults import LinkKind, faults_of_table, read_fault_file
 from robolink_simulators.testkit.media import served
-from robolink_simulators.testkit.operator import written_map, written_recipe
+from robolink_simulators.testkit.operator import written_map, written_recipe, written_symbol_map
 from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
 _OF_ALL: Final = frozenset({"seed", "faults", "speed", "answer_ms"})
@@ -252,7 +252,8 @@ def make_softmotion(
     Args:
         own: Where.
         request: How it is to be.
-        medium: ``sim``, ``modbus-tcp``, ``modbus-rtu`` (not on Windows) or ``can``.
+        medium: ``sim``, ``modbus-tcp``, ``modbus-rtu`` (not on Windows), ``can``, ``opcua`` or
+            ``opcua-secured`` (with asyncua).
         clock: Its time in the process; of its own where that is left out.
         person: Whether there is a person, and a recipe.
 
@@ -284,17 +285,20 @@ def make_plc(
     Args:
         own: Where.
         request: How it is to be; without a map it has two tools, with a commit bit.
-        medium: ``modbus-tcp``, ``modbus-rtu`` (not on Windows) or ``sim``.
+        medium: ``modbus-tcp``, ``modbus-rtu`` (not on Windows), ``opcua`` or
+            ``opcua-secured`` (with asyncua), or ``sim``.
         clock: Its time in the process; of its own where that is left out.
 
     Raises:
         ConfigError: What is asked for does not exist.
     """
-    from robolink.register_maps import load_map
+    from robolink.register_maps import load_plc_map
     from robolink_simulators.plc import PlcSimulator
 
-    path = written_map(own.folder) if request.map is None else Path(request.map)
-    simulator = PlcSimulator(load_map(path), seed=_seed(own, request), answer_ms=request.answer_ms)
+    written = written_symbol_map if medium.startswith("opcua") else written_map
+    path = written(own.folder) if request.map is None else Path(request.map)
+    seed = _seed(own, request)
+    simulator = PlcSimulator(load_plc_map(path), seed=seed, answer_ms=request.answer_ms)
     time = _time(request, medium, clock)
     url = own.stack.enter_context(served(simulator, medium, clock=time, map_file=path))
     return _furnished(own, simulator, time, {medium: url}, request, person=False)

@@ -13,8 +13,8 @@ from robolink_simulators.device.hosted import HostedDevice
 
 MEDIA: Final = {
     "epson": ("sim", "tcp", "serial"),
-    "softmotion": ("sim", "modbus-tcp", "modbus-rtu", "can"),
-    "plc": ("modbus-tcp", "modbus-rtu", "sim"),
+    "softmotion": ("sim", "modbus-tcp", "modbus-rtu", "can", "opcua", "opcua-secured"),
+    "plc": ("modbus-tcp", "modbus-rtu", "opcua", "opcua-secured", "sim"),
 }
 """Media through which each kind of controller can be reached."""
 
@@ -33,10 +33,12 @@ def served(
 
     Args:
         simulator: Of any kind, furnished as the test likes.
-        medium: One of :data:`MEDIA`; ``serial`` and ``modbus-rtu`` not on Windows.
+        medium: One of :data:`MEDIA`; ``serial`` and ``modbus-rtu`` not on Windows, ``opcua``
+            (neither signed nor encrypted) and ``opcua-secured`` with the package asyncua.
         clock: Its time: a ``ManualClock`` in the process, else a ``ScaledClock``. By default a
             clock of its own, which on a port is real time.
-        map_file: The file of the map of a PLC that has one, for its URL.
+        map_file: The file of the map of a PLC that has one, for its URL: a map of symbols for
+            ``opcua``, else one of registers.
 
     Raises:
         ConfigError: There is no such medium for its kind.
@@ -67,7 +69,7 @@ def served(
             module.unregister(name)
         return
     with _host(simulator, medium, clock, given) as host:
-        yield host.url
+        yield host.secured_url if medium == "opcua-secured" else host.url
 
 
 def free_name() -> str:
@@ -100,10 +102,16 @@ def _host(
 
         return (serve_tcp if medium == "tcp" else serve_serial)(simulator, clock=clock)
     if simulator.kind == "plc":
-        from robolink_simulators.plc import serve_plc, serve_plc_line
+        from robolink_simulators.plc import serve_plc, serve_plc_line, serve_plc_opcua
 
+        if medium.startswith("opcua"):
+            return serve_plc_opcua(simulator, **given, clock=clock)
         on_tcp = medium == "modbus-tcp"
         return (serve_plc if on_tcp else serve_plc_line)(simulator, **given, clock=clock)
+    if medium.startswith("opcua"):
+        from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
+
+        return serve_opcua(simulator, clock=clock)
     if medium == "can":
         from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 

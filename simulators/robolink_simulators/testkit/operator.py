@@ -185,3 +185,51 @@ def written_map(folder: Path) -> Path:
     path = folder / "machine.toml"
     path.write_text(MAP, encoding="utf-8")
     return path
+
+
+SYMBOL_MAP: Final = """\
+schema = "robolink/plc-map/1"
+name = "two needles by symbol"
+
+[numbers]
+root = "ns=4;s=|var|PLC.Application.GVL_Tools."
+type = "LREAL"
+
+[[tools]]
+number = 1
+node = "aNeedleA"
+length = 6
+x = { element = 0 }
+y = { element = 1 }
+z = { element = 2 }
+
+[[tools]]
+number = 2
+node = "aNeedleB"
+length = 6
+x = { element = 0 }
+y = { element = 1 }
+z = { element = 2 }
+
+[commit]
+kind = "commit_bit"
+trigger = { node = "xTakeOver" }
+done = { node = "xDone" }
+
+[cycle_counter]
+node = "udiCycle"
+
+[selected]
+node = "uiSelected"
+
+[device_id]
+node = "udiDeviceId"
+"""
+"""Map of a PLC with the same two tools as arrays, by the names of its variables."""
+
+
+def written_symbol_map(folder: Path) -> Path:
+    """Write a map of symbols of a simulated PLC into a folder and return its path."""
+    path = folder / "symbols.toml"
+    path.write_text(SYMBOL_MAP, encoding="utf-8")
+    return path

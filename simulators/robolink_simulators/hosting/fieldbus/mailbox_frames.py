@@ -1,12 +1,11 @@
 """The registers of a simulated PLC behind Modbus frames: requests in, answers out, each in time."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
 from robolink.register_maps import RegisterTable
 from robolink.timing import NS_PER_S, Clock
-from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
+from robolink_simulators.faults import LinkKind, PlcFaultAction
 from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.faults.plan import LinkEnd
 from robolink_simulators.hosting.fieldbus.plc_registers import WORD_BITS, PlcRegisters
@@ -31,9 +30,6 @@ _BANKS: Final = {
 }
 _SILENCE_NS: Final = 50_000_000
 """Silence in ns that ends a frame: earlier data no longer belongs to it."""
-
-_SPLIT_S: Final = 0.01
-"""Delay in seconds of the second half of a split answer."""
 
 
 class MailboxFrames:
@@ -176,10 +172,6 @@ class MailboxFramesLink:
         )
         self._send(frame, served, asked_bytes)
 
-    def _send(self, frame: bytes, served: ServedAccess, asked_bytes: int) -> None:
-        takes_ns = self._device.takes_ns(served.delay_s, asked_bytes + len(frame))
-        self._depart(frame, served.met, self.now_ns + takes_ns)
-
     def _carried_out(self, request: PlcRequest) -> ServedAccess:
         registers, address, values = self._device.registers, request.address, request.values
         bits = request.table in (RegisterTable.COIL, RegisterTable.DISCRETE)
@@ -202,18 +194,10 @@ class MailboxFramesLink:
                 self._outbox.half_open = True
         return self.over or self._outbox.half_open or not served.answered
 
-    def _depart(self, frame: bytes, met: tuple[PlcFault, ...], at_ns: int) -> None:
-        late = b""
-        for fault in met:
-            middle = len(frame) // 2 if fault.position is None else fault.position % len(frame)
-            late = frame[middle:] if fault.action is PlcFaultAction.SPLIT_REPLY else late
-            if fault.action in _CUTS:
-                frame = _CUTS[fault.action](frame, middle)
-            if late:
-                late_ns = at_ns + round((fault.seconds or _SPLIT_S) * NS_PER_S)
-        self._outbox.post(frame, at_ns)
-        if late:
-            self._outbox.post(late, late_ns)
+    def _send(self, frame: bytes, served: ServedAccess, asked_bytes: int) -> None:
+        takes_ns = self._device.takes_ns(served.delay_s, asked_bytes + len(frame))
+        for late_s, piece in served.pieces(frame):
+            self._outbox.post(piece, self.now_ns + takes_ns + round(late_s * NS_PER_S))
 
 
 def _refusal(request: PlcRequest) -> int:
@@ -227,10 +211,3 @@ def _refusal(request: PlcRequest) -> int:
     bits = request.table in (RegisterTable.COIL, RegisterTable.DISCRETE)
     most = REGISTERS * WORD_BITS if bits else REGISTERS
     return ILLEGAL_ADDRESS if request.address + request.count > most else 0
-
-
-_CUTS: Final[dict[PlcFaultAction, Callable[[bytes, int], bytes]]] = {
-    PlcFaultAction.TRUNCATE_REPLY: lambda frame, middle: frame[:middle],
-    PlcFaultAction.SPLIT_REPLY: lambda frame, middle: frame[:middle],
-    PlcFaultAction.DUPLICATE_REPLY: lambda frame, _middle: frame + frame,
-}

@@ -128,9 +128,9 @@ class InProcessMailboxLink:
             if self._pulled:
                 raise self._broken()
             served = serve(self._clock.now_ns())  # the simulator catches up before it serves
-            if served.cut or served.meets(PlcFaultAction.RESET):
+            if served.cut or (served.met and served.meets(PlcFaultAction.RESET)):
                 raise self._broken()
-            silent = not served.answered or served.meets(PlcFaultAction.HALF_OPEN)
+            silent = not served.answered or (served.met and served.meets(PlcFaultAction.HALF_OPEN))
             if silent or served.delay_s > self._timeout_s:
                 self._pass(self._timeout_s)
                 raise self._ended(

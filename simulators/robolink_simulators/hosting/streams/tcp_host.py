@@ -131,7 +131,7 @@ class TcpHost(WireHost):
         lock: AbstractContextManager[object],
         allow_remote: bool = False,
     ) -> None:
-        self._listener = _listening(address, allow_remote=allow_remote)
+        self._listener = listening(address, allow_remote=allow_remote)
         self._scheme = scheme
         self._connections: dict[int, Connection] = {}
         self._address = self._listener.getsockname()[:2]
@@ -184,7 +184,13 @@ class TcpHost(WireHost):
         self._connections[client.fileno()] = connection
 
 
-def _listening(address: tuple[str, int], *, allow_remote: bool) -> socket.socket:
+def listening(address: tuple[str, int], *, allow_remote: bool) -> socket.socket:
+    """Return a socket that listens, without blocking.
+
+    Raises:
+        ConfigError: The address is not loopback and ``allow_remote`` is off.
+        ConnectError: The port is taken, or the address is not this machine's.
+    """
     host, port = address
     require_loopback(host, allow_remote=allow_remote)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET

@@ -1,6 +1,7 @@
 """The states of an axis group in simulated time (docs/reference/softmotion.md 2.2)."""
 
 from collections.abc import Callable
+from typing import Final
 
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axes import Axis
@@ -13,6 +14,8 @@ from robolink_simulators.softmotion.smc_errors import (
     Overruled,
     SmcError,
 )
+
+_LEFT_AT_REST: Final = (SmcGroupState.MOVING, SmcGroupState.STOPPING)
 
 
 class StateMachine:
@@ -226,7 +229,7 @@ class StateMachine:
     @property
     def _settled(self) -> bool:
         """Whether the group is at rest in a state that it leaves for that."""
-        return self._motion.resting and self.state in (SmcGroupState.MOVING, SmcGroupState.STOPPING)
+        return self._motion.resting and self.state in _LEFT_AT_REST
 
     def _cycle_after(self, now_ns: int) -> int:
         return (now_ns // self._cycle_ns + 1) * self._cycle_ns

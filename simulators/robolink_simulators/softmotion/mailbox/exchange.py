@@ -1,6 +1,6 @@
 """The command block as clients write it, and which command in it is a new one."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -18,9 +18,16 @@ from robolink.protocols.mailbox import (
     Words,
     decode_command,
 )
-from robolink_simulators.faults import CountedFaults, LinkKind, PlcFault, PlcFaultAction
+from robolink_simulators.faults import (
+    CountedFaults,
+    Departure,
+    LinkKind,
+    PlcFault,
+    PlcFaultAction,
+)
 from robolink_simulators.faults.drawn import FaultRates, drawn_plc_faults
-from robolink_simulators.faults.links import MAILBOX_LINKS
+from robolink_simulators.faults.links import MAILBOX_LINKS, OF_OPCUA
+from robolink_simulators.faults.plan import LinkEnd
 from robolink_simulators.softmotion.mailbox.image import arranged
 
 _CRC: Final = COMMAND["crc"].word
@@ -147,6 +154,40 @@ class ServedAccess:
         """Return the fault of this kind that the host is to do, ``None`` for none."""
         return next((fault for fault in self.met if fault.action is action), None)
 
+    def pieces(self, frame: bytes) -> list[tuple[float, bytes]]:
+        """Return what leaves instead of a frame: each piece with its seconds behind the answer."""
+        late: tuple[float, bytes] | None = None
+        for fault in self.met:
+            middle = len(frame) // 2 if fault.position is None else fault.position % len(frame)
+            if fault.action is PlcFaultAction.SPLIT_REPLY:
+                late = fault.seconds or _SPLIT_S, frame[middle:]
+            if fault.action in _CUTS:
+                frame = _CUTS[fault.action](frame, middle)
+        return [(0.0, frame)] if late is None else [(0.0, frame), late]
+
+    def departures(self, frame: bytes) -> list[Departure]:
+        """Return what is sent for a request, and when, on a link that is a connection."""
+        if self.cut:
+            return [(0.0, None)]
+        for action, end in _ENDS.items():
+            if self.meets(action):
+                return [(0.0, end)]
+        if not self.answered:
+            return []
+        return [(self.delay_s + late_s, piece) for late_s, piece in self.pieces(frame)]
+
+
+_ENDS: Final[dict[PlcFaultAction, LinkEnd]] = {
+    PlcFaultAction.RESET: LinkEnd.RESET,
+    PlcFaultAction.HALF_OPEN: LinkEnd.HALF_OPEN,
+}
+_CUTS: Final[dict[PlcFaultAction, Callable[[bytes, int], bytes]]] = {
+    PlcFaultAction.TRUNCATE_REPLY: lambda frame, middle: frame[:middle],
+    PlcFaultAction.SPLIT_REPLY: lambda frame, middle: frame[:middle],
+    PlcFaultAction.DUPLICATE_REPLY: lambda frame, _middle: frame + frame,
+}
+_SPLIT_S: Final = 0.01
+"""Delay in seconds of the second half of a split answer."""
 
 _OF_HOSTS: Final = frozenset(
     {
@@ -160,8 +201,28 @@ _OF_HOSTS: Final = frozenset(
         PlcFaultAction.FOREIGN_NODE,
         PlcFaultAction.ECHO,
         PlcFaultAction.MODBUS_EXCEPTION,
+        *OF_OPCUA,
     }
 )
+_REFUSALS: Final = frozenset(
+    {
+        PlcFaultAction.MODBUS_EXCEPTION,
+        PlcFaultAction.OUT_OF_SERVICE,
+        PlcFaultAction.LOSE_SESSION,
+    }
+)
+_REFUSED_WRITES: Final = frozenset({PlcFaultAction.READ_ONLY, PlcFaultAction.WRONG_TYPE})
+
+
+def is_refused(shown: str, actions: Collection[PlcFaultAction]) -> bool:
+    """Return whether a request that meets such faults is not carried out, but answered.
+
+    Args:
+        shown: The request.
+        actions: What it meets.
+    """
+    refused = _REFUSALS if shown.startswith("read") else _REFUSALS | _REFUSED_WRITES
+    return not refused.isdisjoint(actions)
 
 
 def shown_read(first: int, count: int) -> str:
@@ -170,6 +231,8 @@ def shown_read(first: int, count: int) -> str:
         return "read_head" if count == _HEAD_WORDS else "read_response"
     if (first, count) == (DEVICE_START, DEVICE_WORDS):
         return "read_device"
+    if first == RESPONSE_WORDS and first + count == DEVICE_START + DEVICE_WORDS:
+        return "read_slots"
     slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
     if slot >= 0 and offset == 0 and count == SLOT_WORDS:
         return f"read_slot {slot + 1}"
@@ -249,10 +312,7 @@ class WireFaults(CountedFaults[PlcFault]):
                 return self._before[shown]
             case PlcFaultAction.STALE_REPLY:
                 # No earlier answer yet: the fault did not fire and waits for the next read.
-                self.fired.remove(fault)
-                self.times_fired -= 1
-                if not fault.every:  # otherwise the fault recurs by itself
-                    self.add(replace(fault, on_exchange=0, match=fault.match or shown))
+                self.take_back(fault, shown)
         return words
 
     def _garbled(self, words: Sequence[int], fault: PlcFault) -> Words:

@@ -79,8 +79,9 @@ class UserUnits:
 def _six(
     values: Sequence[float], kinds: Sequence[AxisKind], scale: Callable[[float], float]
 ) -> Six:
+    linear = AxisKind.LINEAR
     scaled = [
-        scale(value) if kind is AxisKind.LINEAR else value
+        scale(value) if kind is linear else value
         for value, kind in zip(values, kinds, strict=False)
     ]
     a0, a1, a2, a3, a4, a5 = (*scaled, *(0.0,) * (6 - len(scaled)))

@@ -131,6 +131,9 @@ Handler = Callable[[Command], CommandResult]
 MOVEMENTS: Final = frozenset({Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT})
 
 _MOST_ENDS: Final = 4
+# Before Python 3.12 a member of an Enum is found slowly.
+_ABORTED: Final = CommandState.ABORTED
+_NOT_OWNER: Final = ErrorClass.NOT_OWNER
 _STATES: Final = {
     BlockState.BUSY: CommandState.BUFFERED,
     BlockState.ACTIVE: CommandState.ACTIVE,
@@ -184,7 +187,7 @@ class Job:
             self.state = CommandState.ABORTED
         if outputs.error is not None:
             self._complain(outputs.error, group.state)
-        elif self.state is CommandState.ABORTED:
+        elif self.state is _ABORTED:
             self._explain_abort(group)
         elif self._interrupted(group):
             self.state = CommandState.INTERRUPTED
@@ -247,7 +250,7 @@ class Jobs:
     @property
     def expelled(self) -> bool:
         """Whether something of an owner who lost the mailbox has not ended yet."""
-        return any(job.cause is ErrorClass.NOT_OWNER for job in self.moving)
+        return any(job.cause is _NOT_OWNER for job in self.moving)
 
     @property
     def in_work(self) -> bool:

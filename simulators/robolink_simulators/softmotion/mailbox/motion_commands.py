@@ -73,7 +73,7 @@ class MotionDesk:
 
     def follow(self) -> None:
         """A release is done when the group has left Stopping."""
-        if self._group.state is not SmcGroupState.STOPPING:
+        if self._releases and self._group.state is not SmcGroupState.STOPPING:
             for release in self._releases:
                 release.finish()
             self._releases.clear()

@@ -6,6 +6,7 @@ from typing import ClassVar, Final, Protocol
 from robolink.protocols.mailbox import (
     COMMAND_WORDS,
     DEVICE_START,
+    RESPONSE,
     RESPONSE_WORDS,
     SLOT_WORDS,
     Capability,
@@ -27,6 +28,7 @@ from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.mailbox.tool_commands import ToolDesk
 
 _PRESET_SLOT: Final = 1
+_HEARTBEAT: Final = RESPONSE["plc_heartbeat"].word
 
 
 class RunningProgram(Protocol):
@@ -190,6 +192,12 @@ class Plc:
             return self._frozen[:RESPONSE_WORDS]
         return self._outbox.response(self._modelled, self._heartbeat(now_ns))
 
+    def framed(self, now_ns: int) -> Words:
+        """Return the response between two counts of PLC cycles, as OPC UA shows it."""
+        words = self.read(0, RESPONSE_WORDS, now_ns)
+        count = words[_HEARTBEAT] if self.frozen else self._cycles(now_ns)
+        return (count, *words, count)
+
     def read(self, first: int, count: int, now_ns: int) -> Words:
         """Return words of response, slots and device block."""
         if self.shift:
@@ -214,8 +222,10 @@ class Plc:
             self.program.write(first + self.shift, words[:room], now_ns)
 
     def _heartbeat(self, now_ns: int) -> int:
+        return self._cycles(now_ns if self._beating_until_ns is None else self._beating_until_ns)
+
+    def _cycles(self, until_ns: int) -> int:
         cycle_ns = self._options.group.cycle_us * 1000
-        until_ns = now_ns if self._beating_until_ns is None else self._beating_until_ns
         return (until_ns - self._start_ns) // cycle_ns & 0xFFFF
 
     def _begin_program(self, now_ns: int) -> None:

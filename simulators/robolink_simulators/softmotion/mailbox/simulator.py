@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink.model import ToolOffset
-from robolink.protocols.mailbox import COMMAND, SLOTS, Opcode, Six, Words
+from robolink.protocols.mailbox import COMMAND, COMMAND_WORDS, SLOTS, Opcode, Six, Words
 from robolink_simulators.cell.frames import zyx_angles
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.hosted import HostedDevice
@@ -24,6 +24,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.mailbox.exchange import (
     ServedAccess,
     WireFaults,
+    is_refused,
     shown_read,
     shown_write,
 )
@@ -201,6 +202,12 @@ class SoftMotionSimulator(HostedDevice):
         shown = shown_read(first, count)
         return self._serve(shown, now_ns, link, lambda _: self.plc.read(first, count, self.now_ns))
 
+    def read_framed(self, now_ns: int) -> ServedAccess:
+        """Serve a client that reads the response between its counts of cycles, over OPC UA."""
+        return self._serve(
+            "read_response", now_ns, LinkKind.OPCUA, lambda _: self.plc.framed(self.now_ns)
+        )
+
     def write(
         self,
         first: int,
@@ -223,6 +230,28 @@ class SoftMotionSimulator(HostedDevice):
         """
         shown = shown_write(first, words, _opcode_name(words))
         return self._serve(shown, now_ns, link, lambda faults: self._take(first, words, faults))
+
+    def read_back(
+        self, first: int, count: int, now_ns: int, link: LinkKind = LinkKind.MAILBOX_SIM
+    ) -> ServedAccess:
+        """Serve a client that reads words of the command block, as clients wrote them.
+
+        Requests read ``read_command``, and ``read_beat`` for the heartbeat alone; as :meth:`read`.
+
+        Args:
+            first: Number of the first word.
+            count: How many.
+            now_ns: When, on the clock of the simulated PLC.
+            link: Over which kind of link, by which faults are told apart.
+
+        Example:
+            >>> from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+            >>> SoftMotionSimulator(seed=7).read_back(62, 1, now_ns=0).words
+            (0,)
+        """
+        shown = "read_command" if count == COMMAND_WORDS else "read_beat"
+        taken = slice(first, first + count)
+        return self._serve(shown, now_ns, link, lambda _: self.plc.program.inbox.words[taken])
 
     def snapshot(self, now_ns: int) -> ServedAccess:
         """Serve a client that has the response copied to where it reads it later, over CAN."""
@@ -298,17 +327,19 @@ class SoftMotionSimulator(HostedDevice):
         number = self._requests
         self.log.add(self.now_ns, ">", shown)
         faults = self.faults.take(shown, link)
-        actions = {fault.action for fault in faults}
-        if PlcFaultAction.DISCONNECT_BEFORE in actions:
-            return ServedAccess(answered=False, cut=True)
-        if PlcFaultAction.DROP_REQUEST in actions:
-            return ServedAccess(answered=False)
+        refused = False
+        if faults:
+            actions = {fault.action for fault in faults}
+            if PlcFaultAction.DISCONNECT_BEFORE in actions:
+                return ServedAccess(answered=False, cut=True)
+            if PlcFaultAction.DROP_REQUEST in actions:
+                return ServedAccess(answered=False)
+            refused = is_refused(shown, actions)
         self._mishaps.strike(faults, self.now_ns)
         try:
             if self.on_request is not None:
                 self.on_request(number, shown)
         finally:
-            refused = PlcFaultAction.MODBUS_EXCEPTION in actions
             words = () if refused else carry_out(faults)
             self._file.save_changes()
         self.exchanges += 1
@@ -319,6 +350,9 @@ class SoftMotionSimulator(HostedDevice):
 
     def _take(self, first: int, words: Sequence[int], faults: Sequence[PlcFault]) -> Words:
         words = self.faults.arriving(words, faults)
+        if not faults:
+            self._store(first, words)
+            return ()
         planned = {fault.action: fault for fault in faults}
         if PlcFaultAction.IGNORE_WRITE in planned:
             return ()

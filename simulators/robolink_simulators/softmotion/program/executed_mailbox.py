@@ -5,7 +5,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from robolink import runtime
-from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
+from robolink.protocols.mailbox import (
+    COMMAND,
+    Capability,
+    Command,
+    Opcode,
+    WordOrder,
+    Words,
+    encode_command,
+)
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.mailbox.exchange import Inbox
@@ -26,6 +34,8 @@ from robolink_simulators.structured_text.data_types import DataType
 from robolink_simulators.structured_text.program import ForeignParts
 
 MAIN: Final = "RL_PRG"
+SYMBOLS_OF_MAILBOX: Final = "RL_Symbols"
+"""The list that a program for OPC UA has in the place of addresses."""
 FIRST_LEFT_OUT: Final = 25
 """Number of cycles skipped at first while nothing happens. It doubles each time."""
 
@@ -35,6 +45,7 @@ _REPLY: Final = 9
 _ENDED: Final = 10
 """Lowest state of a command that has ended."""
 _HEARTBEAT: Final = 9
+_CLIENT_HEARTBEAT: Final = COMMAND["client_heartbeat"].word
 _TOOL_SLOT: Final = 11
 _CAPABILITIES: Final = 90
 _CRC: Final = 110
@@ -89,6 +100,10 @@ class ExecutedMailbox:
         self._permitted = True
         self._tool = group.tool
         self.structured = StructuredProgram(sources, MAIN, foreign=self._foreign(sources))
+        self._shown = ("outbox", "slotWords")
+        self._by_symbols = uses_symbols(sources)
+        if self._by_symbols:
+            self._shown = (f"{SYMBOLS_OF_MAILBOX}.response", f"{SYMBOLS_OF_MAILBOX}.slots")
         self._seen: object = ()
 
     @property
@@ -116,10 +131,18 @@ class ExecutedMailbox:
         return self.words[_TOOL_SLOT]
 
     @property
+    def framed(self) -> Words:
+        """The response between two counts of cycles, as a program for OPC UA shows it."""
+        shown = self.structured.value(self._shown[0])
+        if self._by_symbols:
+            return tuple(shown)
+        count = self.cycles & 0xFFFF
+        return (count, *shown, count)
+
+    @property
     def words(self) -> Words:
         """Response, slots and device block, one behind the other."""
-        outbox, slots = self.structured.value("outbox"), self.structured.value("slotWords")
-        return (*outbox, *slots)
+        return (*self.framed[1:-1], *self.structured.value(self._shown[1]))
 
     def start(self, now_ns: int) -> None:
         """Give every variable what it holds at first; the first cycle is due."""
@@ -197,7 +220,7 @@ class ExecutedMailbox:
         self._scanned_ns = began_ns
         self.cycles += 1
         program, group = self.structured, self._group
-        program.put("inbox", list(self.inbox.words))
+        self._put_inbox()
         program.put("RL_Machine.xPermit", self._permitted)
         program.put("RL_Machine.xPowered", group.status().powered)
         program.put("RL_Machine.xAxisMoves", any(axis.moving_alone for axis in group.axes))
@@ -211,6 +234,15 @@ class ExecutedMailbox:
         self._switch_outputs()
         self._judge_rest()
 
+    def _put_inbox(self) -> None:
+        words = list(self.inbox.words)
+        if not self._by_symbols:
+            self.structured.put("inbox", words)
+            return
+        self.structured.put(f"{SYMBOLS_OF_MAILBOX}.heartbeat", words[_CLIENT_HEARTBEAT])
+        words[_CLIENT_HEARTBEAT] = 0  # the array's own counts for nothing
+        self.structured.put(f"{SYMBOLS_OF_MAILBOX}.command", words)
+
     def _switch_outputs(self) -> None:
         for number, on in enumerate(self.structured.value("RL_Machine.outputs")):
             if self._group.outputs.read(number) is not on:
@@ -218,7 +250,7 @@ class ExecutedMailbox:
 
     def _judge_rest(self) -> None:
         """Skip a cycle when this one was like the one before and nothing is in progress."""
-        words = tuple(self.structured.value("outbox"))
+        words = self.framed[1:-1]
         still = (*words[:_HEARTBEAT], *words[_HEARTBEAT + 1 : _CRC])
         calls, seen = self._calls(), self._seen
         going = any((going or reply) and not (going and reply >= _ENDED) for going, reply in calls)
@@ -261,6 +293,11 @@ class ExecutedMailbox:
         symbols = {**SYMBOLS, READ_MODE: _read_modes(sources)}
         groups = dict.fromkeys(_group_names(sources), (AXIS_GROUP, self._group))
         return ForeignParts(types, symbols, groups)
+
+
+def uses_symbols(sources: Sequence[SourceText]) -> bool:
+    """Return whether a program gets its commands over OPC UA, from the list of symbols."""
+    return any(f"{SYMBOLS_OF_MAILBOX}.command" in source.text for source in sources)
 
 
 def _group_names(sources: Sequence[SourceText]) -> Sequence[str]:

@@ -28,6 +28,7 @@ from robolink.protocols.mailbox import (
     encode_slot,
     next_number,
 )
+from robolink.protocols.mailbox.exports import SYMBOL_LIST
 from robolink_simulators.not_now import NotNowError
 from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.group.condition import SmcGroupState
@@ -35,7 +36,10 @@ from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.plc import Plc
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.program.executed_mailbox import ExecutedMailbox
+from robolink_simulators.softmotion.program.executed_mailbox import (
+    ExecutedMailbox,
+    uses_symbols,
+)
 from robolink_simulators.structured_text import SourceText, StructuredProgram, TextDialect
 
 if TYPE_CHECKING:
@@ -158,7 +162,8 @@ PROGRAM_SOURCES: Final = (
     ("robolink_softmotion.st", TextDialect.CODESYS),
     ("robolink_program.st", TextDialect.CODESYS),
 )
-"""Source files that are executed, each with the dialect that it may use."""
+"""Source files that are executed, each with the dialect that it may use. In a program for OPC UA
+the list of its symbols stands before the last."""
 
 _SOMEBODY: Final = 0x5EE7_0002
 _FIRST_SLOT: Final = 1
@@ -257,6 +262,11 @@ class StructuredPlc(Plc):
         """Return the response block."""
         return self.output(now_ns)[:RESPONSE_WORDS]
 
+    def framed(self, now_ns: int) -> Words:
+        """Return the response between two counts of cycles, which are the program's own."""
+        self.output(now_ns)
+        return self._executed.framed
+
     def read(self, first: int, count: int, now_ns: int) -> Words:
         """Return words of response, slots and device block."""
         shown = self.output(now_ns)[first + self.shift :][:count]
@@ -288,17 +298,21 @@ def sources_in(folder: Path) -> tuple[SourceText, ...]:
     Raises:
         ConfigError: A file is missing, or cannot be read.
     """
-    sources = []
-    for name, dialect in PROGRAM_SOURCES:
-        try:
-            text = read_named(folder / name).decode()
-        except (OSError, UnicodeError) as error:
-            raise ConfigError(
-                tr("{path} cannot be read: {cause}.", path=folder / name, cause=error),
-                remedy=tr("Name a folder that 'robolink expert plc export' has written."),
-            ) from error
-        sources.append(SourceText(name, text, dialect))
+    sources = [_source_in(folder, name, dialect) for name, dialect in PROGRAM_SOURCES]
+    if uses_symbols(sources):
+        sources.insert(-1, _source_in(folder, SYMBOL_LIST, TextDialect.CODESYS))
     return tuple(sources)
+
+
+def _source_in(folder: Path, name: str, dialect: TextDialect) -> SourceText:
+    try:
+        text = read_named(folder / name).decode()
+    except (OSError, UnicodeError) as error:
+        raise ConfigError(
+            tr("{path} cannot be read: {cause}.", path=folder / name, cause=error),
+            remedy=tr("Name a folder that 'robolink expert plc export' has written."),
+        ) from error
+    return SourceText(name, text, dialect)
 
 
 def _not_in_a_program() -> NotNowError:

@@ -217,10 +217,11 @@ class EpsonCodec(ABC):
         buffer: Keeps what has arrived.
     """
 
-    __slots__ = ("_arrived", "_ended", "_failure", "_role")
+    __slots__ = ("_arrived", "_ended", "_failure", "_hosts", "_role")
 
     def __init__(self, role: Role, buffer: _Held) -> None:
         self._role = role
+        self._hosts = role is Role.HOST  # asked with every message
         self._arrived = buffer
         self._ended = False
         self._failure: RemoteProtocolError | None = None
@@ -269,7 +270,7 @@ class EpsonCodec(ABC):
         try:
             return self._next_event()
         except RemoteProtocolError as error:
-            if self._role is Role.DEVICE:
+            if not self._hosts:
                 error.raw = b""  # it may hold a password
             self._failure = error
             raise
@@ -405,11 +406,12 @@ class EpsonTextCodec(EpsonCodec):
         """
         if self._failure is not None:
             raise self._failed_again(self._failure)
-        if self._role is Role.HOST and isinstance(event, Request):
-            return write_request(event) + self._terminator
-        if self._role is Role.DEVICE and isinstance(event, Reply):
+        if self._hosts:
+            if isinstance(event, Request):
+                return write_request(event) + self._terminator
+        elif isinstance(event, Reply):
             return write_reply(event, self._encoding) + self._terminator
-        if self._role is Role.DEVICE and isinstance(event, Refusal):
+        elif isinstance(event, Refusal):
             return write_refusal(event, self._encoding) + self._terminator
         raise self._not_sent(event)
 
@@ -433,7 +435,7 @@ class EpsonTextCodec(EpsonCodec):
 
     def _next_event(self) -> Event | Literal[Need.DATA]:
         while (line := self._buffer.take()) is not None:
-            if self._role is Role.DEVICE:
+            if not self._hosts:
                 if self._skips_blanks:
                     line = line.lstrip(BLANKS)
                 return read_request(line, self._encoding)

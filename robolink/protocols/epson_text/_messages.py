@@ -280,6 +280,8 @@ def write_parameters(command: RemoteCommand, parameters: tuple[str, ...]) -> str
 def _read(command: RemoteCommand, payload: str) -> tuple[str, ...] | None:
     most = command.max_parameters
     match command.form:
+        case ParameterForm.STATEMENT:  # most are
+            return _read_statement(payload)
         case ParameterForm.NUMBERS:
             numbers = tuple(text.strip() for text in payload.split(",")[:most])
             if command.bare and not any(numbers):
@@ -287,8 +289,6 @@ def _read(command: RemoteCommand, payload: str) -> tuple[str, ...] | None:
             return numbers if all(map(_is_number, numbers)) else None
         case ParameterForm.PASSWORD:
             return (payload.partition(",")[0],)
-        case ParameterForm.STATEMENT:
-            return _read_statement(payload)
         case ParameterForm.VARIABLE:
             parts = _split_variable(payload)
             surplus_is_dropped = parts is not None and command.reply is ReplyShape.FIELDS

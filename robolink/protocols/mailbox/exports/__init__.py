@@ -3,6 +3,7 @@
 from robolink.protocols.mailbox.exports.eds import electronic_data_sheet
 from robolink.protocols.mailbox.exports.plc_program import (
     PROGRAM_FILES,
+    SYMBOL_LIST,
     PlcopenSchema,
     plcopen_xml,
     program_texts,
@@ -17,6 +18,7 @@ from robolink.protocols.mailbox.exports.register_map import (
 __all__ = [
     "PROGRAM_FILES",
     "PlcopenSchema",
+    "SYMBOL_LIST",
     "electronic_data_sheet",
     "error_table_csv",
     "plcopen_xml",

@@ -54,6 +54,8 @@ PROGRAM_FILES: Final = (
     "robolink_program.st",
 )
 """Source files, each after those that it uses."""
+SYMBOL_LIST: Final = "RL_Symbols.st"
+"""The list that an OPC UA server shows; only a program for OPC UA has it."""
 
 _MARKED_SECTION: Final = (
     r"[ ]*(?:\(\*|//) {name}:(?: \*\))?\n(.*?)[ ]*(?:\(\*|//) end {name}(?: \*\))?\n"
@@ -68,8 +70,9 @@ def program_texts(
     base: int = 0,
     kinematics: str = "",
     read_modes: Sequence[str] = (),
+    opcua: bool = False,
 ) -> Mapping[str, str]:
-    """Return the sources by file name.
+    """Return the sources by file name, each after those that it uses.
 
     Args:
         profile: With ``TOOLS`` nothing that moves is in the text.
@@ -81,6 +84,8 @@ def program_texts(
             and that of the movement commanded last. With them the program reads the tool by
             SMC_GroupReadTool; without, since no document names them, it remembers the one that
             it set last.
+        opcua: Whether clients come over OPC UA. Then the list ``RL_Symbols`` stands in the place
+            of the three addresses.
 
     Example:
         >>> from robolink.protocols.mailbox import ExportProfile
@@ -97,8 +102,10 @@ def program_texts(
     keep["no kinematics"] = not keep["kinematics"]
     keep["coupled"] = keep["kinematics"] and bool(coupled)
     keep |= {"read tool": bool(read_modes), "from memory": not read_modes}
+    keep |= {"symbols": opcua, "registers": not opcua}
+    names = (*PROGRAM_FILES[:-1], SYMBOL_LIST, PROGRAM_FILES[-1]) if opcua else PROGRAM_FILES
     texts = {}
-    for name in PROGRAM_FILES:
+    for name in names:
         text = (folder / name).read_text(encoding="ascii")
         for section, kept in keep.items():
             pattern = re.compile(_MARKED_SECTION.format(name=section), re.DOTALL)
@@ -304,7 +311,7 @@ _SECTIONS: Final = {
 _ELEMENTARY: Final = frozenset(
     ["BOOL", "BYTE", "WORD", "DWORD", "INT", "UINT", "DINT", "UDINT", "LREAL", "TIME"]
 )
-_LISTS: Final = {"RL_Kept.st": ' retain="true"', "RL_Machine.st": ""}
+_LISTS: Final = {"RL_Kept.st": ' retain="true"', "RL_Machine.st": "", SYMBOL_LIST: ""}
 _IDS: Final = uuid.UUID("7d0cb4c5-3f4e-5cde-9a80-3a1f2b6f6f01")
 _ARRAY: Final = re.compile(r"ARRAY \[(-?\d+)\.\.(-?\d+)\] OF (.+)", re.DOTALL)
 
@@ -365,13 +372,14 @@ def plcopen_xml(texts: Mapping[str, str], schema: PlcopenSchema = PlcopenSchema.
     types = [made for text in texts.values() for made in types_in(text)]
     blocks = [made for text in texts.values() for made in blocks_in(text)]
     names = [made.name for made in types] + [made.name for made in blocks]
-    names += [name.partition(".")[0] for name in _LISTS]
+    lists = [name for name in _LISTS if name in texts]
+    names += [name.partition(".")[0] for name in lists]
     return _FRAME.format(
         schema=schema,
         information=_data("projectinformation", "<ProjectInformation />"),
         types="\n".join(map(_type, types)),
         blocks="\n".join(map(_block, blocks)),
-        lists="\n".join(_list(name, texts[name]) for name in _LISTS),
+        lists="\n".join(_list(name, texts[name]) for name in lists),
         tree=_tree(names),
     )
 
@@ -395,8 +403,7 @@ def _block(unit: DeclaredBlock) -> str:
         f"<{_SECTIONS[name]}>{''.join(map(_variable, variables))}</{_SECTIONS[name]}>"
         for name, variables in sections
     )
-    plain = f"<InterfaceAsPlainText>{_xhtml(unit.declaration)}</InterfaceAsPlainText>"
-    added = _data("interfaceasplaintext", plain) + _object_id(unit.name)
+    added = _plain_text(unit.declaration) + _object_id(unit.name)
     return (
         f'      <pou name="{unit.name}" pouType="{kind}"><interface>{interface}</interface>'
         f"<body><ST>{_paragraph(unit.body)}</ST></body><addData>{added}</addData></pou>"
@@ -407,7 +414,10 @@ def _list(file: str, text: str) -> str:
     name = file.partition(".")[0]
     variables = "".join(map(_variable, list_in(text)))
     attributes = '<Attributes><Attribute Name="qualified_only" Value="" /></Attributes>'
-    added = _data("attributes", attributes) + _object_id(name)
+    added = _data("attributes", attributes)
+    if file == SYMBOL_LIST:  # what a variable is published as stands in its pragma alone
+        added += _plain_text(text)
+    added += _object_id(name)
     inside = f"{variables}<addData>{added}</addData>"
     held = f'<globalVars name="{name}"{_LISTS[file]}>{inside}</globalVars>'
     return "    " + _data("globalvars", held)
@@ -461,6 +471,11 @@ def _paragraph(text: str) -> str:
     """Return a body as Beremiz and OpenPLC read it (docs/reference/structured_text.md 3)."""
     space = "http://www.w3.org/1999/xhtml"
     return f'<xhtml:p xmlns:xhtml="{space}">{escape(text)}</xhtml:p>'
+
+
+def _plain_text(declaration: str) -> str:
+    plain = f"<InterfaceAsPlainText>{_xhtml(declaration)}</InterfaceAsPlainText>"
+    return _data("interfaceasplaintext", plain)
 
 
 def _object_id(name: str) -> str:

@@ -185,14 +185,14 @@ def plain(value: object) -> object:
     match value:
         case str():
             return in_english(value)
-        case Mapping():
-            return {
-                key: one if type(one) in _AS_THEY_ARE else plain(one) for key, one in value.items()
-            }
         case list() | tuple():
             if kind not in (list, tuple):  # a class of its own, such as a named tuple
                 return value
             return kind([one if type(one) in _AS_THEY_ARE else plain(one) for one in value])
+        case dict() | Mapping():
+            return {
+                key: one if type(one) in _AS_THEY_ARE else plain(one) for key, one in value.items()
+            }
         case _:
             return value
 

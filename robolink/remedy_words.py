@@ -46,6 +46,7 @@ class RemedyWord:
     RECORD: Final = "trace"
     REFERENCE: Final = "reference=True"
     REMOTE_TIMEOUT: Final = "remote_timeout_s"
+    RENEW_CERTIFICATE: Final = "make_own_certificate(replace=True)"
     SELECTED_TOO: Final = "selected"
     SENSOR: Final = "sensor"
     SIGMA: Final = "sigma_mm"

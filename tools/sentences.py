@@ -8,12 +8,12 @@ and as the command's docstring.
 import ast
 import inspect
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import IO, Any, Final
 
 _HELP: Final = ("help", "short_help")
 _MAKERS: Final = ("command", "group")
-_HOLDS_ONE: Final = re.compile(rb"\b(tr|declared)\s*\(|\b(short_)?help\s*=|\b(command|group)\s*\(")
+HOLDS_ONE: Final = re.compile(rb"\b(tr|declared)\s*\(|\b(short_)?help\s*=|\b(command|group)\s*\(")
 """Every module with a sentence has this; parsing the others would show nothing."""
 
 _Found = tuple[Any, ...]
@@ -28,9 +28,13 @@ def collect(
 ) -> Iterator[_Found]:
     """Yield the sentences of a module; the form is Babel's."""
     source = file.read()
-    if not _HOLDS_ONE.search(source):
-        return
-    for node in ast.walk(ast.parse(source)):
+    if HOLDS_ONE.search(source):
+        yield from collected(ast.walk(ast.parse(source)), keywords)
+
+
+def collected(nodes: Iterable[ast.AST], keywords: Container[str]) -> Iterator[_Found]:
+    """Yield the sentences among the nodes of a module."""
+    for node in nodes:
         if isinstance(node, ast.Call):
             yield from _of_call(node, keywords)
         elif isinstance(node, ast.FunctionDef) and any(map(_makes, node.decorator_list)):
@@ -39,7 +43,7 @@ def collect(
                 yield node.lineno, None, _as_click_reads(docstring), []
 
 
-def _of_call(node: ast.Call, keywords: Mapping[str, Any]) -> Iterator[_Found]:
+def _of_call(node: ast.Call, keywords: Container[str]) -> Iterator[_Found]:
     for said in node.args[:1] if getattr(node.func, "id", "") in keywords else ():
         if isinstance(said, ast.Constant):
             yield node.lineno, None, str(said.value), []

@@ -23,6 +23,7 @@ from robolink.errors import (
     RobolinkError,
     TransportTimeoutError,
 )
+from robolink.inspection._certificates import certificate_findings
 from robolink.inspection._check_record import (
     CheckPlace,
     EndedCheck,
@@ -43,7 +44,7 @@ from robolink.messages import tr
 from robolink.model import Controller, Signature
 from robolink.stopping import SharedStopListener, holders_of
 from robolink.timing import NS_PER_S, Clock, Deadline, SystemClock
-from robolink.transport import far_end_of
+from robolink.transport import far_end_of, parse_url, serves_several
 from robolink.transport.tcp import aside_while_dialling
 from robolink.version import VERSION
 
@@ -62,8 +63,6 @@ DEADLINE_S: Final = 10.0
 """Longest time for one cell, in s; connecting to one that is off ends after its time-out."""
 
 _TICK_S: Final = 0.25
-_SEVERAL_CLIENTS: Final = "+modbus-tcp://"
-"""In the URL of a controller that serves several clients, so that none keeps a check out."""
 
 
 Connect = Callable[[Cell | str], Controller]
@@ -254,7 +253,12 @@ class _Looker:
                     tools = error
                 self._require_time(deadline)
                 cell = None if isinstance(place.cell, str) else place.cell
-                found.append(inspect(controller, tools, cell=cell, since=self._since))
+                inspected = inspect(controller, tools, cell=cell, since=self._since)
+                if "+opcua://" in place.url:
+                    within_s = deadline.remaining_s()
+                    ends = certificate_findings(parse_url(place.url), timeout_s=within_s)
+                    inspected = inspected.with_findings(ends)
+                found.append(inspected)
         controller.latch.require_open(tr("The check"))  # a stop came while it was closing
 
     def _heard(
@@ -284,7 +288,7 @@ def _require_nobody(place: CheckPlace) -> None:
         BusyError: Somebody does; the sentence says who.
         JournalError: The record cannot be read.
     """
-    if _SEVERAL_CLIENTS not in place.url:
+    if not serves_several(place.url):
         for holder in holders_of(far_end_of(place.url), others=True):
             raise _busy(
                 tr(

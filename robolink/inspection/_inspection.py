@@ -38,6 +38,7 @@ class InspectionCode(StrEnum):
     STATION_DUE = "station_due"
     TIP_MOVED = "tip_moved"
     TIP_NOT_MEASURED = "tip_not_measured"
+    CERTIFICATE_ENDS = "certificate_ends"
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,6 +74,14 @@ _CELL: Final = {
         f"{COMPUTER}.config:people",
         declared("Show who works at a cell, and in which role."),
     ),
+    "trust": (
+        f"{COMPUTER}.certificates:trust",
+        declared("Compare the certificate of a PLC's OPC UA server, and keep it."),
+    ),
+    "certificate": (
+        f"{COMPUTER}.certificates:certificate",
+        declared("Show or renew this computer's certificate for OPC UA."),
+    ),
     "station": (
         f"{MEASURE}.station:station",
         declared(

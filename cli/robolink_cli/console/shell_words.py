@@ -38,6 +38,7 @@ SHELL_WAYS: Final = {
     RemedyWord.RECORD: "--record",
     RemedyWord.REFERENCE: "--reference",
     RemedyWord.REMOTE_TIMEOUT: "--remote-timeout",
+    RemedyWord.RENEW_CERTIFICATE: "robolink cell certificate --replace",
     RemedyWord.SELECTED_TOO: "--selected",
     RemedyWord.SENSOR: "--sensor",
     RemedyWord.SIGMA: "--sigma MM",

@@ -4,7 +4,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import click
 
 from robolink import __version__
 from robolink.errors import ConfigError, JournalError
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
     from robolink.calibration_run import Proposal
     from robolink.model import Controller, ControllerFacts, Pose, ToolOffset, ToolReceipt
     from robolink.report import Outcome, Report, TouchOnRecord
+
+
+LINK_REMARK: Final = "robolink.link_remark"
+"""Key of the sentence on how the controller is reached, where a page has to say that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +81,9 @@ class ReportDraft:
         self._outcomes, self._change = controller.outcomes, ""
         self._facts = facts
         self._simulated = simulated
+        context = click.get_current_context(silent=True)
+        remark = "" if context is None else context.meta.get(LINK_REMARK, "")
+        self._of_link: tuple[str, ...] = (remark,) if remark else ()
         self._proposed: dict[str, Any] = {}
         self._receipt: ToolReceipt | None = None
         self._verification: VerifyResult | None = None
@@ -167,6 +176,7 @@ class ReportDraft:
         open_end = recorded.outcome is Outcome.PROPOSED
         return replace(
             recorded,
+            warnings=(*recorded.warnings, *self._of_link),
             outcome=noted.outcome if open_end else recorded.outcome,
             facts=noted.facts,
             impact=noted.impact,
@@ -187,7 +197,7 @@ class ReportDraft:
             outcome=self._outcome(error),
             ending=_ending(error, self._proposed["tool"]),
             verification=self._verification,
-            **self._proposed,
+            **self._proposed | {"warnings": self._proposed.get("warnings", ()) + self._of_link},
         )
 
     def _outcome(self, error: BaseException | None) -> "Outcome":

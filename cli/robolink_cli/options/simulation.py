@@ -70,12 +70,16 @@ def tell_encoding(taken: str | None, *, named: str | None) -> None:
 DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
 """Address at which Modbus TCP is served if no bus is given."""
 
+DEFAULT_OPCUA: Final = "127.0.0.1:4840"
+"""Address at which OPC UA is served if a map of symbols is given, and no bus."""
+
 SECTIONS: Final[tuple[HelpSection, ...]] = (
     (
         declared("Where it is served"),
         frozenset(
             {
                 *("--tcp", "--serial", "--baud", "--can", "--unit", "--node", "--allow-remote"),
+                *("--opcua", "--opcua-user", "--opcua-password-env"),
                 *("--camera", "--camera-folder", "--camera-gige"),
             }
         ),
@@ -276,6 +280,26 @@ class ModbusPlaces(NamedTuple):
             "address": _renamed("--modbus-tcp", self.modbus_tcp, "--tcp", self.address),
             "serial": _renamed("--modbus-rtu", self.modbus_rtu, "--serial", self.serial),
         }
+
+
+class OpcuaPlace(NamedTuple):
+    """Where a PLC is served over OPC UA, and who may come in."""
+
+    opcua: Annotated[
+        str | None,
+        CliOption(
+            metavar="HOST:PORT",
+            help="Serve OPC UA there; port 0 takes a free one. Needs the package asyncua.",
+        ),
+    ] = None
+    opcua_user: Annotated[
+        str | None,
+        CliOption(metavar="NAME", help="Let only this user in over OPC UA; without it anybody."),
+    ] = None
+    opcua_password_env: Annotated[
+        str | None,
+        CliOption(metavar="VAR", help="Environment variable that holds the user's password."),
+    ] = None
 
 
 def _renamed(before: str, old: str | None, now: str, new: str | None) -> str | None:

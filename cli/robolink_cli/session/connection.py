@@ -27,6 +27,7 @@ from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
 from robolink_cli.console.person import person_here
 from robolink_cli.console.render import json_is_on, note
+from robolink_cli.options.report import LINK_REMARK
 from robolink_cli.prompts.questions import WATCHED, asked
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import CELL, REACHED
@@ -131,6 +132,7 @@ def open_controller(
             {WATCHED: controller, REACHED: url, CELL: context.expected}
         )
         remember_address(context)
+        say_how_protected(url)
         with (
             watched_at_desk(controller),
             asking_for_permits(controller, url, context.cell),
@@ -146,6 +148,25 @@ def open_controller(
         # A stop came while the connection was closing: do not report success.
         with controller.ledger.telling():
             controller.latch.require_open(tr("The command"))
+
+
+def say_how_protected(url: str, cell: str = "") -> None:
+    """Say where a connection over OPC UA is less protected than it could be.
+
+    Args:
+        url: Of the controller.
+        cell: Whose it is, where there are several.
+    """
+    if "+opcua://" not in url:
+        return
+    from robolink.transport import parse_url
+    from robolink.transport.opcua.security import protection_remark
+
+    with suppress(ConfigError):  # connecting reports what is wrong with the URL
+        if remark := protection_remark(parse_url(url)):
+            if not cell:
+                click.get_current_context().meta[LINK_REMARK] = remark
+            note(f"{cell}: {remark}" if cell else remark)
 
 
 def _let_a_check_end(url: str) -> None:

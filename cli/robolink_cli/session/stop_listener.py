@@ -109,10 +109,6 @@ def _say_who(who: str) -> None:
     note(tr("Stopped from another terminal by {who}.", who=who))
 
 
-_SEVERAL_CLIENTS = "+modbus-tcp://"
-"""Scheme of servers that accept any number of clients, so that a stop can reach them directly."""
-
-
 def seen_by_another(url: str) -> dict[str, object] | None:
     """Return the document of what the controller's holder last read.
 
@@ -123,10 +119,11 @@ def seen_by_another(url: str) -> dict[str, object] | None:
     Args:
         url: The controller.
     """
-    if _SEVERAL_CLIENTS in url or "+sim://" in url:
+    from robolink.transport import far_end_of, serves_several
+
+    if serves_several(url) or "+sim://" in url:
         return None
     from robolink.stopping import HolderGoneError, holders_of
-    from robolink.transport import far_end_of
 
     try:
         holders = list(holders_of(far_end_of(url)))

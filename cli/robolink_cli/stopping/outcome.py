@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 
-from robolink.errors import JournalError, LeaseHeldError, RobolinkError
+from robolink.errors import ConfigError, JournalError, LeaseHeldError, RobolinkError
 from robolink.messages import in_english, listed, tr
 from robolink.stopping import leave_note
 from robolink.transport import parse_url
@@ -59,11 +59,17 @@ class Telling:
         outcome = self._outcome
         told = [*outcome.doubts]
         taken = [which_cell(outcome.only)] if outcome.only else []
+        if "write_unsecured=yes" in outcome.url and outcome.keys:
+            from robolink.transport.opcua.security import protection_remark
+
+            remark = protection_remark(parse_url(outcome.url))
+            taken += [remark] if remark else []
         if outcome.may_stand and outcome.keys:
             told += self._noted()
         told += self._recorded()
         told += self._logged()
         told += self._journal()
+        told += self._own_certificate()
         if told and outcome.error is None:
             told.append(tr("The stop went out anyway."))
         if outcome.error is None:
@@ -171,6 +177,19 @@ class Telling:
         if open_now and note_at_work(log, self._named):
             return []
         return [marker_notice(marker, self._named) for marker in open_now]
+
+    def _own_certificate(self) -> list[str]:
+        """Return that others can read this computer's key: a stop used it all the same."""
+        url = self._outcome.url
+        if "+opcua://" not in url or "security=none" in url:
+            return []
+        from robolink.transport.opcua.own_certificate import find_own_certificate
+
+        try:
+            find_own_certificate()
+        except ConfigError as error:
+            return [error.what]
+        return []
 
 
 def _use_journal_of(named: str) -> None:

@@ -7,6 +7,7 @@ serves several clients, so there the stop goes out directly and that process hea
 """
 
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
@@ -21,13 +22,13 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.stopping import HolderGoneError, holders_of
-from robolink.transport import far_end_of
+from robolink.transport import far_end_of, serves_several
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:
     from robolink.transport import Direction
 
-_SEVERAL_CLIENTS: Final = "+modbus-tcp://"
+_USER_OF_OPC_UA: Final = re.compile(r"\+opcua://.*[?&]user=")
 
 
 @dataclass
@@ -109,7 +110,7 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
         password_file = password_file or reach.password_file
         outcome.doubts += [reach.doubt] if reach.doubt else []
     outcome.keys = far_end_of(outcome.url)
-    several = _SEVERAL_CLIENTS in outcome.url
+    several = serves_several(outcome.url)
     refusals: list[RobolinkError] = []
     if not several and _through_holder(request, outcome, refusals):
         return
@@ -215,7 +216,7 @@ def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: s
 
 def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
     """Yield passwords to try; the keyring last, because it is slow, or asks."""
-    if not outcome.url.startswith("epson+"):
+    if not (outcome.url.startswith("epson+") or _USER_OF_OPC_UA.search(outcome.url)):
         yield ""
         return
     from robolink.config.passwords import from_keyring, from_places

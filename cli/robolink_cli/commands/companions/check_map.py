@@ -1,8 +1,9 @@
 """plc check-map: whether a map is right, as far as the file, a probe or a person can show."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
@@ -11,12 +12,13 @@ from robolink.messages import joined, tr
 from robolink.model import json_fields
 from robolink.register_maps import (
     COMPONENTS,
+    AnyMap,
     ComparedValue,
     MapDiffersError,
+    MapDraft,
     MapValue,
-    Number,
     OpenValue,
-    RegisterMap,
+    SymbolMap,
     compare,
     compare_test,
     confirm,
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from robolink.controllers import PlcMapController
 
 
-@click.command("check-map", short_help="Check the map of a PLC's registers.")
+@click.command("check-map", short_help="Check the map of a PLC's registers or symbols.")
 @controller_options
 def check_map(
     context: CliContext,
@@ -53,6 +55,14 @@ def check_map(
             help="Draft a map from a register list and show it. Does nothing else.",
         ),
     ] = None,
+    browse: Annotated[
+        str | None,
+        CliOption(
+            "--browse",
+            metavar="NODE",
+            help="Draft a map from what the OPC UA server of -c has below a node; / is all of it.",
+        ),
+    ] = None,
     shows: Annotated[
         tuple[str, ...],
         CliOption(
@@ -61,13 +71,15 @@ def check_map(
         ),
     ] = (),
 ) -> None:
-    """Check the map of a PLC's registers: the file, or with -c its values against the HMI.
+    """Check the map of a PLC's registers or symbols: the file, or with -c its values at the HMI.
 
     robolink changes only values that somebody has compared here. One value of each component and
     one of each tool are enough; a component that is 0 needs a test value.
     """
     if register_list is not None:
         _start(register_list)
+    elif browse is not None:
+        _browse(context, browse)
     elif file is not None:
         _check_file(file)
     else:
@@ -77,14 +89,44 @@ def check_map(
 def _start(register_list: Path) -> None:
     from robolink.register_maps import draft_from_csv
 
-    draft = draft_from_csv(register_list)
+    _show_draft(draft_from_csv(register_list))
+
+
+def _browse(context: CliContext, node: str) -> None:
+    from robolink.controllers import browse_nodes, draft_from_nodes
+    from robolink.transport import open_opcua, parse_url
+    from robolink_cli.session.connection import password_of, say_how_protected
+
+    url = parse_url(context.require_url())
+    if (url.kind, url.medium) != ("plc", "opcua"):
+        raise ConfigError(
+            tr("{url} is not a PLC with an OPC UA server.", url=url.identity),
+            remedy=tr("Give -c plc+opcua://192.168.0.2:4840."),
+        )
+    options = {name: said for name, said in url.options.items() if name not in _OF_THE_DRIVER}
+    client = open_opcua(
+        replace(url, options=options), timeout_s=context.timeout_s, password=password_of(context)
+    )
+    try:
+        say_how_protected(context.require_url())
+        found = browse_nodes(client, node)
+    finally:
+        client.close()
+    _show_draft(draft_from_nodes(url.host, found))
+
+
+_OF_THE_DRIVER: Final = ("map", "simulated")
+"""Options of a URL that are not the client's."""
+
+
+def _show_draft(draft: MapDraft) -> None:
     payload = {"map": draft.text, **json_fields(draft, "found", "left", "bad", "notes")}
     emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
     for remark in (*draft.notes, *draft.bad):
         note(remark)
     note(
         tr(
-            "Tool components found: {found}. Rows left for you: {left}. Fill in the rest, "
+            "Tool components found: {found}. Left for you: {left}. Fill in the rest, "
             "then: robolink expert plc check-map MAP.toml",
             found=draft.found,
             left=len(draft.left),
@@ -93,9 +135,9 @@ def _start(register_list: Path) -> None:
 
 
 def _check_file(file: Path) -> None:
-    from robolink.register_maps import load_map
+    from robolink.register_maps import load_plc_map
 
-    found = load_map(file)
+    found = load_plc_map(file)
     rows = place_rows(found)
     payload: dict[str, object] = {
         "name": found.name,
@@ -108,6 +150,7 @@ def _check_file(file: Path) -> None:
         say(tr("The file is valid. To compare its values with the HMI, add -c."))
 
     emit("plc-map", payload, show)
+    _note_half_written(found)
 
 
 def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
@@ -117,6 +160,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
         values = MapValues(controller)
         if not json_is_on():
             values.show()
+        _note_half_written(register_map)
         controller.require_probe()
         comparison = MapComparison(context, controller)
         if shows:
@@ -159,6 +203,7 @@ def _opened(context: CliContext) -> "PlcMapController":
     from robolink.controllers import open_plc_map
     from robolink.journal import memory_journal
     from robolink.transport import parse_url
+    from robolink_cli.session.connection import password_of, say_how_protected
 
     url = parse_url(context.require_url())
     if url.kind != "plc":
@@ -166,13 +211,28 @@ def _opened(context: CliContext) -> "PlcMapController":
             tr("{url} is not a PLC with a map.", url=url.identity),
             remedy=tr("Give -c plc+modbus-tcp://192.168.0.2?map=machine.toml, or a map file."),
         )
+    say_how_protected(context.require_url())
     # Nothing is written here, so only the confirmation is recorded.
     return open_plc_map(
         url,
         outcomes=lambda identity: memory_journal(identity).log(identity),
         timeout_s=context.timeout_s,
         compare_probe=False,
+        password=password_of(context) if url.medium == "opcua" else None,
     )
+
+
+def _note_half_written(found: AnyMap) -> None:
+    """Say which tools the machine may use while only a part of them has arrived."""
+    if isinstance(found, SymbolMap) and found.half_written:
+        note(
+            tr(
+                "Without a handshake the machine may work with a half-written tool for a moment: "
+                "{tools}. Let the PLC take values over on a signal ([commit]), or write only while "
+                "the machine stands.",
+                tools=", ".join(map(str, found.half_written)),
+            )
+        )
 
 
 class MapValues:
@@ -223,18 +283,18 @@ class MapValues:
             note(why)
 
 
-def place_rows(register_map: RegisterMap) -> list[list[str]]:
+def place_rows(register_map: AnyMap) -> list[list[str]]:
     """Return which value is where, every number given both ways."""
     rows = []
     for slot in register_map.slots.values():
         for name, number in slot.components.items():
-            rows.append([f"{slot.tool}.{name}", number.place, _form(number)])
+            rows.append([f"{slot.tool}.{name}", number.place, number.form])
         if slot.defined is not None:
             rows.append([tr("{tool} defined", tool=slot.tool), slot.defined.place, ""])
-    rows += [[f"flange.{name}", n.place, _form(n)] for name, n in register_map.flange.items()]
+    rows += [[f"flange.{name}", n.place, n.form] for name, n in register_map.flange.items()]
     if register_map.probe is not None:
         number = register_map.probe.number
-        rows.append([tr("probe"), number.place, f"{register_map.probe.value:g}, {_form(number)}"])
+        rows.append([tr("probe"), number.place, f"{register_map.probe.value:g}, {number.form}"])
     commit = register_map.commit
     named = (
         (tr("request"), commit.request),
@@ -252,17 +312,6 @@ def place_rows(register_map: RegisterMap) -> list[list[str]]:
         for one in register_map.inputs.values()
     ]
     return rows
-
-
-def _form(number: Number) -> str:
-    words = [str(number.type)]
-    if number.type.words > 1:
-        words.append(tr("low word first") if number.low_word_first else tr("high word first"))
-    if number.swapped_bytes:
-        words.append(tr("bytes swapped"))
-    if number.factor != 1:
-        words.append(tr("times {factor:g}", factor=number.factor))
-    return ", ".join(words)
 
 
 class MapComparison:

@@ -1,6 +1,6 @@
 """plc export: what a PLC programmer needs to serve the mailbox."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -85,21 +85,44 @@ def export(
             "Beremiz."
         ),
     ] = "0200",
-    force: Annotated[bool, CliOption(help="Overwrite files that you have changed.")] = False,
+    opcua: Annotated[
+        bool,
+        CliOption(
+            help="For OPC UA instead of registers: with the list RL_Symbols, which the PLC's "
+            "server shows."
+        ),
+    ] = False,
+    force: Annotated[
+        bool,
+        CliOption(
+            help="Overwrite files that you have changed, and remove those of an export for the "
+            "other link."
+        ),
+    ] = False,
 ) -> None:
-    """Write the program of the mailbox, its register map and its CANopen data sheet.
+    """Write the program of the mailbox; for registers also their map and CANopen data sheet.
 
-    docs/plc-program.md explains how to use them. Their licence is 0BSD: you may use them in a
+    docs/plc-program.md explains how to use the files. Their licence is 0BSD: you may use them in a
     machine without conditions.
     """
     schema = PlcopenSchema(plcopen)
-    texts = plc_texts(ExportProfile(profile), base, kinematics, read_modes, schema=schema)
-    written = [str(path) for path in export_texts(folder, texts, replace=force)]
+    if opcua and base:
+        raise ConfigError(
+            tr("A program for OPC UA has no registers, so --base has no meaning with --opcua."),
+            remedy=tr("Give one of the two."),
+        )
+    chosen = ExportProfile(profile)
+    texts = plc_texts(chosen, base, kinematics, read_modes, schema=schema, opcua=opcua)
+    others = plc_texts(chosen, base, opcua=not opcua).keys() - texts.keys()
+    written, removed = export_texts(folder, texts, sorted(others), replace=force)
     if json_is_on():
-        emit_json("robolink/plc-export/1", {"files": written, "profile": profile, "base": base})
+        payload = {"files": written, "removed": removed, "profile": profile, "base": base}
+        emit_json("robolink/plc-export/1", payload)
     else:
         for path in written:
             say(tr("wrote {path}", path=path))
+        for path in removed:
+            say(tr("removed {path}", path=path))
 
 
 def plc_texts(
@@ -109,6 +132,7 @@ def plc_texts(
     read_modes: Sequence[str] = (),
     *,
     schema: PlcopenSchema = PlcopenSchema.CODESYS,
+    opcua: bool = False,
 ) -> Mapping[str, str]:
     """Return the files by name.
 
@@ -119,6 +143,7 @@ def plc_texts(
             30004; empty for none.
         read_modes: The three symbols of SMC_READ_TOOL_MODE, or none.
         schema: Under which name space the PLCopen XML stands.
+        opcua: Whether clients come over OPC UA.
 
     Raises:
         ConfigError: There is no such kinematics.
@@ -126,36 +151,76 @@ def plc_texts(
     if kinematics and find_kinematics_word(kinematics) is None:
         raise ConfigError(
             tr("{name} is not a kinematics of the register map.", name=kinematics),
-            remedy=tr("See the table of kinematics in register_map.md."),
+            remedy=tr("See the table of kinematics in companions/codesys/register_map.md."),
         )
-    program = program_texts(profile, base=base, kinematics=kinematics, read_modes=read_modes)
+    program = program_texts(
+        profile, base=base, kinematics=kinematics, read_modes=read_modes, opcua=opcua
+    )
+    registers = {
+        "register_map.csv": register_map_csv(base),
+        "register_map.md": register_map_markdown(profile, base),
+        "robolink_mailbox.eds": electronic_data_sheet(),
+    }
     return {
         **program,
         "robolink_program.xml": plcopen_xml(program, schema),
         "errors.csv": error_table_csv(),
-        "register_map.csv": register_map_csv(base),
-        "register_map.md": register_map_markdown(profile, base),
-        "robolink_mailbox.eds": electronic_data_sheet(),
+        **({} if opcua else registers),
         "robolink_mailbox_types.st": structured_text_types(profile),
     }
 
 
-def export_texts(folder: Path, texts: Mapping[str, str], *, replace: bool = False) -> list[Path]:
+def export_texts(
+    folder: Path, texts: Mapping[str, str], others: Iterable[str], *, replace: bool = False
+) -> tuple[list[str], list[str]]:
     """Write the files into ``folder``, which is created if it is missing.
 
     A file that is there already with the same content is fine.
 
+    Args:
+        folder: Where to.
+        texts: The files by name.
+        others: Names that the program of the other link has alone: left in the folder, such a
+            file would be taken for a part of this one.
+        replace: Whether what differs is overwritten, and what is of the other link removed.
+
+    Returns:
+        The files that are there, and those that were removed.
+
     Raises:
-        ConfigError: A file is there that differs, or one cannot be written.
+        ConfigError: A file is there that differs or is of the other link, or one cannot be
+            written or removed.
     """
     _make(folder)
+    left = [path for name in others if (path := folder / name).is_file()]
+    if left and not replace:
+        raise ConfigError(
+            tr(
+                "{path} is of another export: with --opcua there are no registers, without it no "
+                "symbols.",
+                path=left[0],
+            ),
+            remedy=tr("Export into another folder, or give --force to remove it."),
+        )
     files = {folder / name: text.encode() for name, text in texts.items()}
     stale = {path: data for path, data in files.items() if not holds(path, data)}
     for path in stale:
         require_free(path, replace=replace)
     for path, data in stale.items():
         save_named(path, data, replace=replace)
-    return list(files)
+    for path in left:
+        _remove(path)
+    return list(map(str, files)), list(map(str, left))
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise ConfigError(
+            tr("{path} cannot be removed: {cause}.", path=path, cause=error.strerror or error),
+            remedy=tr("Delete the file yourself: this program does not have it."),
+        ) from error
 
 
 def _make(folder: Path) -> None:

@@ -45,7 +45,7 @@ from robolink_cli.options.consent import Published
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.session.completion import complete_recipe
-from robolink_cli.session.connection import open_controller, password_of
+from robolink_cli.session.connection import open_controller, password_of, say_how_protected
 from robolink_cli.session.context import (
     CliContext,
     context_of_cell,
@@ -154,6 +154,8 @@ def _checked(
     proof = proof_of_files()
     signature = signature_of(contexts[0].operator, None, changes=False)
     recorded = any(one.record for one in contexts)
+    for one in contexts:
+        say_how_protected(one.require_url(), one.cell.name if one.cell else "")
     with ExitStack() as stack:
 
         def connect(target: Cell | str) -> Controller:

@@ -16,6 +16,7 @@ import robolink
 from robolink.errors import ConfigError
 from robolink.files.durable import state_folder
 from robolink.messages import declared, spoken, tr
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label
 from robolink_cli.commands.computer.lines import serial_ports
 from robolink_cli.console.tables import padded
@@ -248,6 +249,7 @@ def check_up() -> list[Remark]:
         "state": check_state_folder,
         "cells": check_cell_files,
         "keyring": check_keyring,
+        "opcua": check_certificates,
         "serial": check_serial_ports,
         "lines": check_lines_of_cells,
         "journal": check_journal,
@@ -342,6 +344,48 @@ def check_keyring() -> Iterator[Remark]:
         yield Remark("keyring", Level.WARN, tr("this computer has no keyring service."), other)
     else:
         yield Remark("keyring", Level.OK, type(found).__module__)
+
+
+def check_certificates() -> Iterator[Remark]:
+    """Check this computer's certificate for OPC UA, and what cells say of their servers."""
+    from robolink.config import load_cells
+    from robolink.transport import parse_url
+
+    links = {}
+    with suppress(ConfigError):  # another remark is about wrong cell files
+        links = {cell.name: parse_url(cell.url) for cell in load_cells().values()}
+    links = {name: link for name, link in links.items() if link.medium == "opcua"}
+    if not links:
+        return
+    from robolink.transport.opcua.own_certificate import find_own_certificate
+    from robolink.transport.opcua.security import protection_remark
+
+    for name, link in links.items():
+        remark = protection_remark(link)
+        if remark:
+            yield Remark("opcua", Level.WARN, f"{name}: {remark}")
+        elif "server_certificate" not in link.options:
+            yield Remark(
+                "opcua",
+                Level.WARN,
+                tr("{cell}: nobody has compared the certificate of its server.", cell=name),
+                tr('Run: robolink -c "{where}" cell trust', where=name),
+            )
+    own = find_own_certificate()
+    renewal = remedy_word(RemedyWord.RENEW_CERTIFICATE)
+    if own is None:
+        yield Remark(
+            "opcua", Level.OK, tr("this computer has no certificate yet; it is made once.")
+        )
+    elif own.days_left < 0:
+        day = own.ends.date()
+        said = tr("this computer's certificate is no longer valid, since {day}.", day=day)
+        yield Remark("opcua", Level.BAD, said, tr("Run: {command}", command=renewal))
+    elif own.ends_soon:
+        said = tr("this computer's certificate ends on {day}.", day=own.ends.date())
+        yield Remark("opcua", Level.WARN, said, tr("Run: {command}", command=renewal))
+    else:
+        yield Remark("opcua", Level.OK, f"{own.public_path} ({own.ends.date()})")
 
 
 def check_serial_ports() -> Iterator[Remark]:

@@ -12,7 +12,7 @@ from robolink.model import json_fields
 from robolink_cli.access.record import recording
 from robolink_cli.console.render import emit, note, say, table
 from robolink_cli.options.declaration import CliOption
-from robolink_cli.session.connection import password_of
+from robolink_cli.session.connection import password_of, say_how_protected
 from robolink_cli.session.context import CliContext, controller_options
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ def _verify_plc(context: CliContext, url: str, kind: str) -> None:
             tr("verify-controller does not apply to a PLC with its own registers."),
             remedy=tr('Compare its map instead: robolink -c "{url}" expert plc check-map', url=url),
         )
+    say_how_protected(url)
     # Nothing is written, so nothing is recorded.
     log = memory_journal(url).log(url)
     with robolink.connect(url, timeout_s=context.timeout_s, outcomes=log) as controller:

@@ -1,6 +1,5 @@
 """sim epson: serves a simulated EPSON controller."""
 
-import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -20,8 +19,12 @@ from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Secret
-from robolink_cli.commands.simulate.service import host_and_port, named_values, world_from
+from robolink_cli.commands.simulate.service import (
+    host_and_port,
+    named_values,
+    password_in,
+    world_from,
+)
 from robolink_cli.commands.simulate.simulated_kind import SimulatedKind, plan_faults
 from robolink_cli.console.render import note
 from robolink_cli.options.simulation import tell_encoding
@@ -60,7 +63,7 @@ def make_epson(
     simulator = EpsonSimulator(
         robot,
         seed=seed,
-        password=password_in(password_env),
+        password=password_in(password_env, "--password-env"),
         options=habits(options, profile),
         state_path=state,
         world=world_from(world) if world else None,  # the default needs no check
@@ -225,23 +228,6 @@ def start_function(runner: ProgramRunner, name: str, now_ns: int) -> None:
         raise click.UsageError(
             tr("There is no function {name} without arguments.", name=name)
         ) from refusal
-
-
-def password_in(variable: str | None) -> Secret | None:
-    """Return the password in an environment variable, ``None`` when none is named.
-
-    Raises:
-        ConfigError: The variable holds none.
-    """
-    if variable is None:
-        return None
-    value = os.environ.get(variable)
-    if not value:
-        raise ConfigError(
-            tr("The environment variable {variable} holds no password.", variable=variable),
-            remedy=tr("Set it first, or leave --password-env out."),
-        )
-    return Secret(value)
 
 
 def habits(options: Sequence[str], profile: Path | None) -> EpsonOptions:

@@ -1,4 +1,4 @@
-"""sim plc: serves a simulated PLC whose tools are where a map says."""
+"""sim plc: serves a simulated PLC whose tools are where a map says: registers or symbols."""
 
 from contextlib import ExitStack
 from pathlib import Path
@@ -6,13 +6,13 @@ from typing import Any, Final
 
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import LinkKind
-from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
+from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line, serve_plc_opcua
 
 from robolink.messages import tr
-from robolink.register_maps import load_map
-from robolink_cli.commands.simulate.service import host_and_port
+from robolink.register_maps import SymbolMap, load_plc_map
+from robolink_cli.commands.simulate.service import host_and_port, opcua_users
 from robolink_cli.commands.simulate.simulated_kind import SimulatedKind, plan_faults
-from robolink_cli.options.simulation import DEFAULT_ADDRESS
+from robolink_cli.options.simulation import DEFAULT_ADDRESS, DEFAULT_OPCUA
 
 
 def make_plc(
@@ -24,6 +24,7 @@ def make_plc(
     faults: Path | None,
     address: str | None,
     serial: str | None,
+    opcua: str | None,
     answer_ms: float,
     cell: str = "",
     **_placing: Any,  # noqa: ANN401 - other options
@@ -36,17 +37,24 @@ def make_plc(
         ConfigError: One of them makes no sense.
     """
     simulator = PlcSimulator(
-        load_map(map_file),
+        load_plc_map(map_file),
         unit=unit,
         seed=seed,
         most_registers=most_registers,
         answer_ms=answer_ms,
     )
-    served = {LinkKind.PLC_RTU} if serial is not None else set()
-    if address is not None or serial is None:
-        served |= {LinkKind.PLC_TCP}
-    plan_faults(simulator, faults, served, cell=cell)
+    plan_faults(simulator, faults, _links(simulator, address, serial, opcua), cell=cell)
     return simulator
+
+
+def _links(
+    simulator: PlcSimulator, address: str | None, serial: str | None, opcua: str | None
+) -> set[LinkKind]:
+    """Return the links on which it is served; the map decides where none is named."""
+    named = {LinkKind.PLC_TCP: address, LinkKind.PLC_RTU: serial, LinkKind.PLC_OPCUA: opcua}
+    links = {link for link, place in named.items() if place is not None}
+    by_symbol = isinstance(simulator.register_map, SymbolMap)
+    return links or {LinkKind.PLC_OPCUA if by_symbol else LinkKind.PLC_TCP}
 
 
 def _place(
@@ -57,20 +65,29 @@ def _place(
     map_file: Path,
     address: str | None,
     serial: str | None,
+    opcua: str | None,
+    opcua_user: str | None,
+    opcua_password_env: str | None,
     allow_remote: bool,
     **_making: Any,  # noqa: ANN401 - other options
 ) -> dict[str, str]:
     """Serve it on each bus."""
-    if address is None and serial is None:
-        address = DEFAULT_ADDRESS
+    users = opcua_users(opcua_user, opcua_password_env)
+    links = _links(simulator, address, serial, opcua)
     urls: dict[str, str] = {}
-    if address is not None:
-        listen = host_and_port(address, "--tcp")
+    if LinkKind.PLC_TCP in links:
+        listen = host_and_port(address or DEFAULT_ADDRESS, "--tcp")
         tcp = serve_plc(simulator, map_file, *listen, clock=clock, allow_remote=allow_remote)
         urls["modbus-tcp"] = stack.enter_context(tcp).url
     if serial is not None:
         line = serve_plc_line(simulator, map_file, clock=clock)
         urls["modbus-rtu"] = stack.enter_context(line).url
+    if LinkKind.PLC_OPCUA in links:
+        listen = host_and_port(opcua or DEFAULT_OPCUA, "--opcua")
+        served = serve_plc_opcua(
+            simulator, map_file, *listen, clock=clock, users=users, allow_remote=allow_remote
+        )
+        urls |= stack.enter_context(served).urls
     return urls
 
 

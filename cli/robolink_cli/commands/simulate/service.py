@@ -17,6 +17,7 @@ from click.core import ParameterSource
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import Secret
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on, note
 from robolink_cli.options.simulation import ServedLife
@@ -229,6 +230,42 @@ def host_and_port(address: str, option: str) -> tuple[str, int]:
             remedy=tr("Write for example {option} 127.0.0.1:5000.", option=option),
         )
     return host, int(port)
+
+
+def password_in(variable: str | None, option: str) -> Secret | None:
+    """Return the password in an environment variable, ``None`` when none is named.
+
+    Args:
+        variable: Its name.
+        option: The option that names it.
+
+    Raises:
+        ConfigError: The variable holds none.
+    """
+    if variable is None:
+        return None
+    value = os.environ.get(variable)
+    if not value:
+        raise ConfigError(
+            tr("The environment variable {variable} holds no password.", variable=variable),
+            remedy=tr("Set it first, or leave {option} out.", option=option),
+        )
+    return Secret(value)
+
+
+def opcua_users(name: str | None, variable: str | None) -> dict[str, Secret]:
+    """Return the password of the one user whom an OPC UA server lets in; empty for anybody.
+
+    Raises:
+        ConfigError: A name without a password, or the other way round.
+    """
+    password = password_in(variable, "--opcua-password-env")
+    if (name is None) is not (password is None):
+        raise ConfigError(
+            tr("A user of the OPC UA server needs a name and a password."),
+            remedy=tr("Give both --opcua-user and --opcua-password-env, or neither."),
+        )
+    return {} if name is None or password is None else {name: password}
 
 
 def named_values(texts: Sequence[str], example: str) -> dict[str, str]:

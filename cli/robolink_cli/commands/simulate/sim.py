@@ -17,6 +17,7 @@ from robolink_cli.options.simulation import (
     ExchangeTime,
     FaultPlan,
     ModbusPlaces,
+    OpcuaPlace,
     Pace,
     ProjectOptions,
     Seed,
@@ -30,13 +31,14 @@ from robolink_cli.options.simulation import (
     "plc",
     cls=SectionedCommand,
     sections=SECTIONS,
-    short_help="Serve a simulated PLC with the registers of any map.",
+    short_help="Serve a simulated PLC with the registers or symbols of any map.",
 )
 @json_option
 def sim_plc(
     *,
     map_file: Annotated[Path, CliOption("--map", help="The map; docs/plc-maps.md explains it.")],
     places: ModbusPlaces,
+    opcua: OpcuaPlace,
     unit: Annotated[
         int,
         click.IntRange(0, 255),
@@ -55,9 +57,10 @@ def sim_plc(
     allow_remote: AllowRemote = False,
     life: ServedLife,
 ) -> None:
-    """Serve a simulated PLC with the registers of any map until Ctrl-C.
+    """Serve a simulated PLC with the registers or symbols of any map until Ctrl-C.
 
-    You can give both buses; they belong to the same PLC.
+    You can give both Modbus links; they belong to the same PLC. A map of symbols is served over
+    OPC UA, on 127.0.0.1:4840 unless you say otherwise.
     """
     from robolink_cli.commands.simulate.plc import PLC_KIND
     from robolink_cli.commands.simulate.simulated_kind import serve_alone
@@ -65,6 +68,7 @@ def sim_plc(
     options = {
         "map_file": map_file,
         **places.by_name_of_today(),
+        **opcua._asdict(),
         "unit": unit,
         "most_registers": most_registers,
         "seed": seed,
@@ -134,6 +138,7 @@ class _SoftMotionOptions(NamedTuple):
 def softmotion(
     *,
     places: ModbusPlaces,
+    opcua: OpcuaPlace,
     given: _SoftMotionOptions,
     simulation: SimulationOptions,
     life: ServedLife,
@@ -146,7 +151,8 @@ def softmotion(
     from robolink_cli.commands.simulate.simulated_kind import serve_alone
     from robolink_cli.commands.simulate.softmotion import SOFTMOTION_KIND
 
-    options = {**places.by_name_of_today(), **given._asdict(), **simulation._asdict()}
+    where = {**places.by_name_of_today(), **opcua._asdict()}
+    options = {**where, **given._asdict(), **simulation._asdict()}
     serve_alone(SOFTMOTION_KIND, life, options)
 
 

@@ -1,7 +1,7 @@
 """sim softmotion: serves a simulated PLC on one or several field buses."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,13 @@ from robolink_simulators.softmotion.program.structured_plc import plc_maker
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.commands.simulate.service import host_and_port, named_values, world_from
+from robolink.model import Secret
+from robolink_cli.commands.simulate.service import (
+    host_and_port,
+    named_values,
+    opcua_users,
+    world_from,
+)
 from robolink_cli.commands.simulate.simulated_kind import SimulatedKind, plan_faults
 from robolink_cli.options.simulation import DEFAULT_ADDRESS
 
@@ -37,6 +43,7 @@ class Buses:
         modbus_tcp: HOST:PORT.
         modbus_rtu: ``pty``.
         can: INTERFACE:CHANNEL, with :PORT for udp_multicast.
+        opcua: HOST:PORT.
         unit: Number on the serial line.
         node: Number on the CAN bus.
         allow_remote: Whether other machines may reach it.
@@ -45,6 +52,7 @@ class Buses:
     modbus_tcp: str | None
     modbus_rtu: str | None
     can: str | None
+    opcua: str | None
     unit: int
     node: int
     allow_remote: bool
@@ -56,6 +64,7 @@ class Buses:
             LinkKind.MODBUS_TCP: self.modbus_tcp,
             LinkKind.MODBUS_RTU: self.modbus_rtu,
             LinkKind.CAN: self.can,
+            LinkKind.OPCUA: self.opcua,
         }
         named = frozenset(kind for kind, place in wanted.items() if place is not None)
         return named or frozenset({LinkKind.MODBUS_TCP})
@@ -102,9 +111,13 @@ def _place(
     stack: ExitStack,
     simulator: SoftMotionSimulator,
     clock: ScaledClock,
+    *,
+    opcua_user: str | None,
+    opcua_password_env: str | None,
     **given: Any,  # noqa: ANN401
 ) -> dict[str, str]:
-    return _served(stack, simulator, _buses(**given), clock)
+    users = opcua_users(opcua_user, opcua_password_env)
+    return _served(stack, simulator, _buses(**given), clock, users)
 
 
 def _buses(
@@ -112,21 +125,26 @@ def _buses(
     address: str | None,
     serial: str | None,
     can: str | None,
+    opcua: str | None,
     unit: int,
     node: int,
     allow_remote: bool,
     **_making: Any,  # noqa: ANN401 - other options
 ) -> Buses:
-    return Buses(address, serial, can, unit=unit, node=node, allow_remote=allow_remote)
+    return Buses(address, serial, can, opcua, unit=unit, node=node, allow_remote=allow_remote)
 
 
 def _served(
-    stack: ExitStack, simulator: SoftMotionSimulator, buses: Buses, clock: ScaledClock
+    stack: ExitStack,
+    simulator: SoftMotionSimulator,
+    buses: Buses,
+    clock: ScaledClock,
+    users: Mapping[str, Secret],
 ) -> dict[str, str]:
     """Serve the PLC on each bus; unwanted ones are not imported."""
     urls: dict[str, str] = {}
     address = buses.modbus_tcp
-    if address is None and buses.modbus_rtu is None and buses.can is None:
+    if buses.kinds == {LinkKind.MODBUS_TCP} and address is None:
         address = DEFAULT_ADDRESS
     if address is not None:
         from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
@@ -144,6 +162,14 @@ def _served(
 
         can = serve_canopen(simulator, _can_place(buses.can, buses.node), clock=clock)
         urls["can"] = stack.enter_context(can).url
+    if buses.opcua is not None:
+        from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
+
+        host, port = host_and_port(buses.opcua, "--opcua")
+        opcua = serve_opcua(
+            simulator, host, port, clock=clock, users=users, allow_remote=buses.allow_remote
+        )
+        urls |= stack.enter_context(opcua).urls
     return urls
 
 

@@ -1,26 +1,32 @@
 """TLS for a panel that other computers can reach: a certificate of its own, and what one says.
 
 A shop with a CA gives its own certificate. Else ``robolink panel cert`` makes one that signs
-itself: it is a leaf and no CA, so whoever steals its key can pretend to be this panel, and nobody
-else. A person compares its fingerprint once on each tablet.
+itself; a person compares its fingerprint once on each tablet.
 """
 
 import os
 import ssl
 import stat
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
 from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from robolink.errors import ConfigError
+from robolink.files.certificates import (
+    SIGNING,
+    CertificatePurpose,
+    certificate_as_pem,
+    fingerprint_of,
+    key_as_pem,
+    self_signed,
+)
 from robolink.files.durable import make_folder, state_folder, sync_folder, write_whole
 from robolink.messages import tr
 from robolink.timing import wall_time
@@ -73,16 +79,19 @@ def make(names: Collection[str], *, replace: bool = False) -> Certificate:
             remedy=tr("Nothing was changed. To make a new one: robolink panel cert --replace"),
         )
     key = ec.generate_private_key(ec.SECP256R1())
-    data = _signed(key, tuple(dict.fromkeys(names))).public_bytes(serialization.Encoding.PEM)
-    secret = key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
+    called = tuple(dict.fromkeys(names))
+    purpose = CertificatePurpose(
+        f"robolink panel {called[0]}",
+        [_general_name(name) for name in called],
+        SIGNING,
+        [ExtendedKeyUsageOID.SERVER_AUTH],
+        VALID_DAYS - 1,
     )
+    certificate = self_signed(key, purpose)
     try:
         make_folder(path.parent)
-        write_whole(key_path, secret)  # for its owner only
-        write_whole(path, data)
+        write_whole(key_path, key_as_pem(key))  # for its owner only
+        write_whole(path, certificate_as_pem(certificate))
         sync_folder(path.parent)
     except OSError as error:
         raise ConfigError(
@@ -135,8 +144,7 @@ def load(path: Path, key: Path) -> Certificate:
             tr("The certificate {path} is for no name.", path=path),
             remedy=tr("Browsers need its names as subject alternative names."),
         )
-    fingerprint = found.fingerprint(hashes.SHA256()).hex(":").upper()
-    return Certificate(path, key, names, fingerprint, found.not_valid_after_utc)
+    return Certificate(path, key, names, fingerprint_of(found), found.not_valid_after_utc)
 
 
 def context(path: Path, key: Path) -> ssl.SSLContext:
@@ -154,38 +162,6 @@ def context(path: Path, key: Path) -> ssl.SSLContext:
 
 def _no_password() -> str:
     raise OSError(tr("its key has a password, for which nobody can be asked"))
-
-
-def _signed(key: ec.EllipticCurvePrivateKey, names: Sequence[str]) -> x509.Certificate:
-    now = datetime.now(UTC)
-    called = [_general_name(name) for name in names]
-    called_so = f"robolink panel {names[0]}"[:_MOST_NAME]
-    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, called_so)])
-    usage = x509.KeyUsage(
-        digital_signature=True,
-        content_commitment=False,
-        key_encipherment=False,
-        data_encipherment=False,
-        key_agreement=False,
-        key_cert_sign=False,
-        crl_sign=False,
-        encipher_only=False,
-        decipher_only=False,
-    )
-    return (
-        x509.CertificateBuilder()
-        .subject_name(subject)
-        .issuer_name(subject)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - timedelta(hours=1))
-        .not_valid_after(now + timedelta(days=VALID_DAYS - 1))
-        .add_extension(x509.SubjectAlternativeName(called), critical=False)
-        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
-        .add_extension(usage, critical=True)
-        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
-        .sign(key, hashes.SHA256())
-    )
 
 
 def _general_name(name: str) -> x509.GeneralName:

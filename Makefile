@@ -15,6 +15,7 @@ PEER := $(VENV)/bench-peer
 JUDGES := $(VENV)/judges
 API_JUDGE := $(VENV)/schemathesis
 TYPE_JUDGE := $(VENV)/pyright
+OPCUA_JUDGE := $(VENV)/node-opcua/node_modules/node-opcua
 WHEELHOUSE := wheelhouse
 POT := robolink/locale/robolink.pot
 
@@ -63,7 +64,7 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F87, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) $(TYPE_JUDGE) ## Let foreign programs judge buses, PLC program, control API and examples.
+peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) $(TYPE_JUDGE) $(OPCUA_JUDGE) ## Let foreign programs judge buses, PLC program, control API and examples.
 	@{ command -v mbpoll && command -v tshark && command -v node && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
@@ -84,6 +85,11 @@ $(API_JUDGE): $(VENV)/.installed-dev
 $(TYPE_JUDGE): $(VENV)/.installed-dev
 	mkdir -p $@
 	npm install --silent --no-fund --no-audit --prefix $@ pyright@1.1.414 || true
+
+# Some 120 packages of JavaScript, which nothing but its judge reads; without them that judge fails.
+$(OPCUA_JUDGE): $(VENV)/.installed-dev
+	mkdir -p $(VENV)/node-opcua
+	npm install --silent --no-fund --no-audit --prefix $(VENV)/node-opcua node-opcua@2.186.4 && touch $@ || true
 
 # Debian's chromium, or what `chromium` on PATH is. With NEED_CHROMIUM=1 a test that cannot run fails.
 .PHONY: panel

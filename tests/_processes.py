@@ -13,9 +13,8 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator
-from itertools import groupby
+from itertools import chain, compress, groupby
 from multiprocessing.connection import Connection, Pipe, wait
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -48,7 +47,7 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
         return None
     if not hasattr(os, "fork"):
         raise pytest.UsageError("--processes needs a system that can fork; leave it out")
-    modules = [list(tests) for _, tests in groupby(session.items, _unit)]
+    modules = _units(session.items)
     # Tests of faults fork, which costs less while little was run: it copies tables of all memory.
     modules.sort(key=lambda tests: "faults" not in tests[0].path.parts)
     queue = _numbers(len(modules))
@@ -70,10 +69,23 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     return True
 
 
-def _unit(test: pytest.Item) -> Path:
-    """Return the module of a test, or its folder where all modules use one database server."""
-    folder = test.path.parent
-    return folder if (folder / "_postgresql.py").exists() else test.path
+def _units(items: list[pytest.Item]) -> list[list[pytest.Item]]:
+    """Return the tests of each module; those of all that use the database server are together."""
+    modules = [list(tests) for _, tests in groupby(items, lambda test: test.path)]
+    served = [any(map(_uses_server, tests)) for tests in modules]
+    together = list(chain.from_iterable(compress(modules, served)))
+    others = [tests for tests, uses in zip(modules, served, strict=True) if not uses]
+    return [together, *others] if together else others
+
+
+def _uses_server(test: pytest.Item) -> bool:
+    """Whether a test has the run's ``server``, or a parameter for which its fixtures ask for it."""
+    drawn = getattr(getattr(test, "callspec", None), "params", {}).values()
+    if any(isinstance(one, str) and one == "postgresql" for one in drawn):
+        return True
+    known = getattr(test, "_fixtureinfo", None)
+    found = known.name2fixturedefs.get("server") if known is not None else None
+    return found is not None and found[-1].scope == "session"
 
 
 def _numbers(count: int) -> int:

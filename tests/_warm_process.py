@@ -39,13 +39,15 @@ _PROGRAMS: Final = (
     "robolink_cli.job_process",
     "robolink_cli.panel.stop",
     "tests.contract._own_window",
+    "benchmarks.work.asked_cells",
+    "tests._program",
     "tests.fleet._killed_next",
 )
 _STARTS_OTHERS: Final = "panel"
 """The command that leaves a copy of itself to be forked."""
 NAME: Final = "warm-process"
 """The name of such a copy in ``/proc/PID/comm``: it is no process of the panel."""
-_READ_LATER: Final = ("PYTHONPATH", "PYTHONIOENCODING")
+_READ_LATER: Final = ("PYTHONPATH", "PYTHONIOENCODING", "PYTHON_KEYRING_BACKEND")
 """Variables that a forked command obeys too."""
 _FREE_FROM: Final = 200
 """Descriptors from here on are nobody's in a process that was just forked."""
@@ -254,6 +256,7 @@ def _become(
     code: Any = 1
     try:
         runpy.run_module(program, run_name="__main__", alter_sys=True)
+        code = 0
     except SystemExit as end:
         code = end.code
     except BaseException:

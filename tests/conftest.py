@@ -115,6 +115,17 @@ def signals_of_a_terminal(monkeypatch):
         signal.signal(number, handler)
 
 
+@pytest.fixture(scope="session")
+def server():
+    """The one PostgreSQL server of a process that runs tests."""
+    from tests.contract.journal._postgresql import is_installed, served
+
+    if not is_installed():
+        pytest.skip("PostgreSQL is not installed here: initdb and postgres are missing")
+    with served() as server:
+        yield server
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup():
     """Forget everything recorded before this test.
@@ -169,8 +180,9 @@ def pytest_itemcollected(item):
         item.add_marker(pytest.mark.timeout(900))
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Leave out the soak tests unless the command line names their mark."""
+    """Leave out the soak tests, and constants of the sources, unless they are asked for."""
     # Tests are selected by name, so a name must not contain a memory address.
     if changing := [item.nodeid for item in items if " at 0x" in item.nodeid]:
         raise pytest.UsageError(f"give this test ids that are alike in each run: {changing[0]}")
@@ -180,10 +192,22 @@ def pytest_collection_modifyitems(config, items):
         item.user_properties += [("fault", row) for row in sorted(rows)]
     if "soak" in config.option.markexpr:
         return
+    draw_no_constants_of_the_sources()
     left_out = [item for item in items if item.get_closest_marker("soak")]
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if not item.get_closest_marker("soak")]
+
+
+def draw_no_constants_of_the_sources():
+    """Let Hypothesis draw the constants that it knows, and none of the sources.
+
+    It would parse every module for them, which takes 3.5 s of CPU in a fresh clone, and compare
+    thousands with each strategy. It reads them in ``make soak``.
+    """
+    providers: Any = sys.modules.get("hypothesis.internal.conjecture.providers")
+    if hasattr(providers, "_get_local_constants"):
+        providers._get_local_constants = lambda: providers._local_constants
 
 
 def pytest_collection_finish():

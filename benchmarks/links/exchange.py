@@ -9,19 +9,16 @@ Python processes take turns in the same caches: there the driver's own work (abo
 measured alone) costs twice that, and slows the simulator's answer down as well.
 """
 
-import contextlib
-import json
 import os
 import socket
-import subprocess
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from statistics import median
 from time import perf_counter_ns
 from urllib.parse import urlsplit
 
 import robolink
-from benchmarks.links.placing import a_cpu_each
+from benchmarks.links.opcua_reads import opcua_reads
+from benchmarks.links.placing import a_cpu_each, served_simulator
 from benchmarks.table import Amount, Figure
 from robolink.journal import memory_journal
 
@@ -31,14 +28,15 @@ WARM_UP = 150
 
 
 def measure_exchange() -> Iterator[Figure]:
-    """Yield the figures of a GetStatus exchange over TCP."""
+    """Yield the figures of a GetStatus exchange over TCP, and of reads over OPC UA."""
     with a_cpu_each() as simulator_cpu:
         if simulator_cpu is None:
             yield from _compare("where the system put them", goal=1.35)
-            return
-        yield from _compare("a CPU each", goal=1.35, simulator_cpu=simulator_cpu)
-        (ours,) = os.sched_getaffinity(0)
-        yield from _compare("sharing one CPU", goal=None, simulator_cpu=ours)
+        else:
+            yield from _compare("a CPU each", goal=1.35, simulator_cpu=simulator_cpu)
+            (ours,) = os.sched_getaffinity(0)
+            yield from _compare("sharing one CPU", goal=None, simulator_cpu=ours)
+        yield from opcua_reads(simulator_cpu)
 
 
 def _compare(
@@ -55,28 +53,6 @@ def _compare(
         median(ours / floor for floor, ours in rounds),
         goal,
     )
-
-
-@contextlib.contextmanager
-def served_simulator(
-    cpu: int | None, serving: Sequence[str] = ("epson", "--tcp", "127.0.0.1:0")
-) -> Iterator[str]:
-    """Serve a simulator in a process of its own, on the CPU ``cpu``; gives its URL."""
-    command = [sys.executable, "-m", "robolink_cli", "sim", *serving]
-    process = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, text=True)
-    try:
-        if cpu is not None:
-            os.sched_setaffinity(process.pid, {cpu})
-        assert process.stdout is not None  # noqa: S101 - a pipe was asked for
-        yield json.loads(process.stdout.readline())["url"]
-    finally:
-        process.terminate()
-        try:
-            process.communicate(timeout=10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
-            raise
 
 
 def _raw_round(url: str) -> float:

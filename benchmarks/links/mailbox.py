@@ -23,8 +23,7 @@ from typing import Final
 
 import robolink
 from benchmarks.links.bare_links import ACK, SLOT, Bare, bare_can, bare_modbus, free_port
-from benchmarks.links.exchange import served_simulator
-from benchmarks.links.placing import a_cpu_each
+from benchmarks.links.placing import a_cpu_each, served_simulator
 from benchmarks.table import Amount, Figure
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset

@@ -23,10 +23,13 @@ from urllib.parse import urlsplit
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from benchmarks.table import Amount, Figure
+from robolink.model import Secret
+from robolink.protocols.mailbox import COMMAND, COMMAND_WORDS, Opcode
 
 ROUNDS = 15
 _WHOLE = """
@@ -58,6 +61,7 @@ z_mm = 130.0
 """All optional parts of a cell file. The positions of the stations do not matter."""
 
 _CAN_PORT = 43217
+_OPCUA_GOAL = 18.0
 
 
 class Tap:
@@ -142,6 +146,7 @@ def measure_stopping() -> Iterator[Figure]:
             pairs = [(_run(floor), _to_frame(command, tap)) for _ in range(ROUNDS)]
             yield _figure(what, pairs, 2.50)
         yield from _over_canopen(robolink, floor)
+        yield from _over_opcua(robolink, floor)
         for name, what in (
             ("tcp", "EPSON over TCP"),
             ("modbus", "PLC over Modbus TCP"),
@@ -166,25 +171,59 @@ def _cells(urls: dict[str, str]) -> str:
 
 
 def _over_canopen(robolink: str, floor: list[str]) -> Iterator[Figure]:
-    """Measure a stop over CANopen: the simulator's own log tells when 2003 came in.
-
-    The node's answers are not subtracted here, so the figure is somewhat too large.
-    """
+    """Measure a stop over CANopen; the node's answers are not subtracted."""
     simulator = SoftMotionSimulator(seed=1)
     place = CanPlace("udp_multicast", "239.74.163.9", port=_CAN_PORT)
     with serve_canopen(simulator, place) as host:
-        command = [robolink, "-c", host.url, "stop"]
-        pairs = []
-        for _ in range(ROUNDS):
-            before, began_ns = _run(floor), monotonic_ns()
-            _run(command)
-            arrived_ns = min(
-                at_ns
-                for at_ns, way, text in simulator.log
-                if way == ">" and text.startswith("write_command STOP") and at_ns > began_ns
-            )
-            pairs.append((before, (arrived_ns - began_ns) / 1e6))
+        pairs = _until_told([robolink, "-c", host.url, "stop"], floor, simulator)
     yield _figure("robolink stop to the 2003 frame, PLC over CANopen", pairs, 5.00)
+
+
+def _over_opcua(robolink: str, floor: list[str]) -> Iterator[Figure]:
+    """Measure a stop over OPC UA, plain by its bytes, and encrypted.
+
+    What the server takes to answer is subtracted only where nothing is encrypted.
+    """
+    simulator = SoftMotionSimulator(seed=1)
+    what = "robolink stop to the 2003 frame, PLC over OPC UA"
+    with serve_opcua(simulator) as host:
+        tap = Tap(_port(host.url), _stops_over_opcua)
+        url = host.url.replace(str(_port(host.url)), str(tap.port), 1)
+        command = [robolink, "-c", url, "stop"]
+        _run(command)
+        pairs = [(_run(floor), _to_frame(command, tap)) for _ in range(ROUNDS)]
+        tap.close()
+        yield _figure(f"{what}, not encrypted", pairs, _OPCUA_GOAL)
+    os.environ["ROBOLINK_PASSWORD"] = "of a benchmark"
+    with serve_opcua(simulator, users={"bench": Secret(os.environ["ROBOLINK_PASSWORD"])}) as host:
+        command = [robolink, "-c", host.secured_url, "stop"]
+        _run(command)  # makes this computer's certificate
+        pairs = _until_told(command, floor, simulator)
+        yield _figure(f"{what}, encrypted and logged in", pairs, _OPCUA_GOAL)
+
+
+def _stops_over_opcua(piece: bytes) -> bool:
+    """Return whether a message writes the array of a command block that stops."""
+    array = piece.partition(COMMAND_WORDS.to_bytes(4, "little"))[2][: 2 * COMMAND_WORDS]
+    at = 2 * COMMAND["opcode"].word
+    return int.from_bytes(array[at : at + 2], "little") == Opcode.STOP
+
+
+def _until_told(
+    command: list[str], floor: list[str], simulator: SoftMotionSimulator
+) -> list[tuple[float, float]]:
+    """Return the times of floor and stop in ms; the simulator's log tells when 2003 came in."""
+    pairs = []
+    for _ in range(ROUNDS):
+        before, began_ns = _run(floor), monotonic_ns()
+        _run(command)
+        arrived_ns = min(
+            at_ns
+            for at_ns, way, text in simulator.log
+            if way == ">" and text.startswith("write_command STOP") and at_ns > began_ns
+        )
+        pairs.append((before, (arrived_ns - began_ns) / 1e6))
+    return pairs
 
 
 def _figure(what: str, pairs: list[tuple[float, float]], goal: float) -> Figure:

@@ -17,8 +17,7 @@ from time import perf_counter_ns
 from urllib.parse import urlsplit
 
 import robolink
-from benchmarks.links.exchange import served_simulator
-from benchmarks.links.placing import a_cpu_each
+from benchmarks.links.placing import a_cpu_each, served_simulator
 from benchmarks.table import Amount, Figure
 from robolink.journal import open_journal
 from robolink.model import ToolOffset

@@ -25,6 +25,7 @@ OTHER = "epson+tcp://192.0.2.2:5000"
 
 HEAVY = {
     "numpy",
+    "asyncua",
     "pymodbus",
     "can",
     "canopen",

@@ -92,7 +92,7 @@ def environment(tmp_path, encoding):
 def test_no_command_and_no_error_fails_for_want_of_a_character(tmp_path, encoding):
     codes = tmp_path / "codes.json"
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-m", "tests._program", PROGRAM],
         env=environment(tmp_path, encoding)
         | {"COMMAND_LINES": json.dumps([*COMMANDS]), "CODES": str(codes)},
         cwd=tmp_path,

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.plc import PlcSimulator, serve_plc
+from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_opcua
 
 import robolink
-from robolink.register_maps import load_map
+from robolink.register_maps import SymbolMap, load_plc_map, load_symbol_map
 from robolink.testing import confirm_whole_map
 
 MAPS = Path("examples/plc-maps").absolute()
@@ -35,8 +35,9 @@ def serve(state_folder):
 
     def served(name):
         path = MAPS / f"{name}.toml"
-        plc = PlcSimulator(load_map(path), seed=1)
-        hosts.append(serve_plc(plc, path))
+        plc = PlcSimulator(load_plc_map(path), seed=1)
+        by_symbol = isinstance(plc.register_map, SymbolMap)
+        hosts.append((serve_plc_opcua if by_symbol else serve_plc)(plc, path))
         return hosts[-1].url, plc
 
     yield served
@@ -75,9 +76,108 @@ def test_a_register_list_becomes_the_beginning_of_a_map(shown, tmp_path):
     code, out, err = shown("plc", "check-map", "--from-csv", str(path))
     assert code == 0
     assert 'x = { table = "holding", address = 100, type = "REAL" }' in out
-    assert "Rows left for you: 1" in err
+    assert "Left for you: 1" in err
     code, out, _ = shown("plc", "check-map", "--from-csv", str(path), "--json")
     assert document(out, "plc-map-draft")["left"] == ["Commit"]
+
+
+def test_a_map_of_symbols_is_shown_with_its_nodes(shown):
+    code, out, _ = shown("--json", "plc", "check-map", str(MAPS / "by-symbol.toml"))
+    places = document(out, "plc-map")["places"]
+    root = "ns=4;s=|var|PLC.Application.GVL_Tools."
+    assert {"what": "1.u", "place": f"{root}aNeedleA, element 3", "how": "LREAL"} in places
+    assert f"{root}wInputs bit 3" in [place["place"] for place in places]
+    assert code == 0
+
+
+def test_a_tool_that_the_machine_may_use_half_written_is_named(shown, tmp_path):
+    path = tmp_path / "machine.toml"
+    text = """
+schema = "robolink/plc-map/1"
+name = "half"
+[numbers]
+type = "LREAL"
+[[tools]]
+number = 3
+node = "ns=4;s=|var|PLC.Application.GVL.aTool"
+length = 2
+x = { element = 0 }
+%s
+[commit]
+kind = "none"
+"""
+    for more, named in (("y = { element = 1 }", True), ("", False)):
+        path.write_text(text % more, encoding="utf-8")
+        code, out, error = shown("plc", "check-map", str(path))
+        assert (code, "half-written tool for a moment: 3" in out + error) == (0, named)
+    code, out, error = shown("plc", "check-map", str(MAPS / "by-symbol.toml"))
+    assert (code, "half-written" in out + error) == (0, False)
+
+
+def test_the_values_of_symbols_are_compared_like_those_of_registers(shown, serve):
+    url, plc = serve("by-symbol")
+    check = ["-c", url, "--json", "plc", "check-map"]
+    code, out, err = shown(*check)
+    assert (code, "--shows 1.y=" in out + err) == (9, True)
+    values = {
+        f"{t}.{n}": v
+        for t, o in plc.truth()["stored"].items()
+        for n, v in zip("xyzu", o.values(), strict=False)
+    }
+    code, out, _ = shown(*check, *shows({"values": values}, "1.x", "1.y", "1.z", "1.u", "2.x"))
+    found = document(out, "plc-map-values")
+    assert (code, found["probe"], found["not_compared"]) == (0, "fits", [])
+    assert shown("-c", url, "tool", "set", "1", "--y", "2.5")[0] == 0
+    assert plc.program.in_force[1]["y"] == 2.5
+    code, out, err = shown(*check, "--shows", "1.x=99.99")
+    assert (code, "withdrawn" in out + err) == (2, True)
+
+
+def test_what_a_server_has_becomes_the_beginning_of_a_map(shown, serve, tmp_path):
+    url, _ = serve("by-symbol")
+    bare = url.replace("map=", "map=missing-")
+    code, out, err = shown("-c", bare, "plc", "check-map", "--browse", "/")
+    assert code == 0
+    assert "#   ns=4;s=|var|PLC.Application.GVL_Tools.aNeedleA: Double[6]" in out
+    assert "Left for you: 14" in err
+    code, _, err = shown("-c", bare, "plc", "check-map", "--browse", "/DeviceSet/PLC/Nothing")
+    assert (code, "/DeviceSet/PLC/Nothing" in err) == (5, True)
+    path = tmp_path / "machine.toml"
+    path.write_text(STRUCTURE, encoding="utf-8")
+    with serve_plc_opcua(PlcSimulator(load_symbol_map(path), seed=1), path) as host:
+        code, out, _ = shown("-c", host.url, "--json", "plc", "check-map", "--browse", "/")
+    draft = document(out, "plc-map-draft")
+    assert (code, draft["found"], draft["left"]) == (0, 2, [])
+    lines = draft["map"].splitlines()
+    first = lines.index("[[tools]]")
+    assert lines[first + 1 : first + 5] == [
+        "number = 1",
+        'node = "stTool1"',
+        'x = { field = "rX" }',
+        'y = { field = "rY" }',
+    ]
+
+
+STRUCTURE = """
+schema = "robolink/plc-map/1"
+name = "a structure"
+[numbers]
+root = "ns=4;s=|var|PLC.Application.GVL."
+type = "REAL"
+[[tools]]
+number = 1
+node = "stTool1"
+x = { field = "rX" }
+y = { field = "rY" }
+[commit]
+kind = "none"
+"""
+
+
+def test_only_a_server_of_opc_ua_has_names_to_list(shown, serve):
+    url, _ = serve("commit-bit")
+    code, _, err = shown("-c", url, "plc", "check-map", "--browse", "/")
+    assert (code, "is not a PLC with an OPC UA server" in err) == (2, True)
 
 
 EACH = ("1.x", "1.y", "1.z", "1.u", "2.x")

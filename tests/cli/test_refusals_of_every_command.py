@@ -161,6 +161,8 @@ BAD = {
     "cell list": (["oven-*"], "There is no cell"),
     "cell check": (["--since", "yesterday"], "cannot be 'yesterday'"),
     "cell people": (["nowhere"], "nowhere"),
+    "cell trust": ([], "not reached over OPC UA"),
+    "cell certificate": (["again"], "Too many words"),
     "cell fleet plan": (["missing.toml"], "missing.toml"),
     "cell fleet status": (["--why", "a"], "--why needs the plan"),
     "cell fleet run": (["0123456789ab"], "There is no plan yet"),

@@ -384,7 +384,7 @@ def test_the_environment_names_the_controller(monkeypatch):
 
 
 HEAVY = """
-can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlite3 logging
+asyncua can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlite3 logging
 asyncio robolink.journal robolink.calibration robolink.controllers.epson.controller
 robolink.controllers.softmotion.controller
 """
@@ -399,13 +399,22 @@ print(*sorted(set(sys.argv[1:]) & set(sys.modules)), sep=",")
 """
 
 
-@pytest.mark.parametrize("kind", ["epson", "modbus"])
+OF_ASYNCUA = {"asyncio", "asyncua", "logging"}
+
+
+@pytest.mark.parametrize("kind", ["epson", "modbus", "opcua"])
 def test_nothing_heavy_is_loaded_before_the_robot_stands(state_folder, kind):
+    expected = set()
     with ExitStack() as stack:
         if kind == "epson":
             url = stack.enter_context(serve_tcp(EpsonSimulator(seed=4))).url
-        else:
+        elif kind == "modbus":
             url = stack.enter_context(serve_modbus_tcp(SoftMotionSimulator(seed=4))).url
+        else:
+            from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
+
+            url = stack.enter_context(serve_opcua(SoftMotionSimulator(seed=4))).url
+            expected = OF_ASYNCUA
         Path("robolink.toml").write_text(CELL.format(url=url, more=""))
         done = subprocess.run(
             [sys.executable, "-c", PROBE, *HEAVY.split()],
@@ -415,7 +424,7 @@ def test_nothing_heavy_is_loaded_before_the_robot_stands(state_folder, kind):
             timeout=30,
             env={**os.environ, "ROBOLINK_STATE_DIR": str(state_folder)},
         )
-    assert (done.stdout, done.stderr) == ("\n", "")
+    assert (done.stdout, done.stderr) == (",".join(sorted(expected)) + "\n", "")
 
 
 WHOLE = """

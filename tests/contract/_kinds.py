@@ -1,10 +1,12 @@
 """Every kind of controller, and the acts that Python code can ask of each."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.testkit.media import served
 
@@ -23,11 +25,13 @@ from robolink.model import (
     WorkBox,
 )
 from robolink.protocols.mailbox import Kinematics
-from robolink.testing import Subject
+from robolink.register_maps import load_symbol_map
+from robolink.testing import Subject, confirm_whole_map
 from robolink.testing.subject import another_offset
 from robolink.transport import parse_url
 from tests.contract.third_kind import BenchServer, open_bench
-from tests.unit._plc_bench import COMMIT_BIT, Bench, LocalClient
+from tests.unit._plc_bench import COMMIT_BIT, EXAMPLES, Bench, LocalClient
+from tests.unit._symbol_bench import LocalSymbolClient, SymbolBench
 
 Act = Callable[[Controller, int], object]
 _PROFILE = MotionProfile(Path.STRAIGHT, speed_mm_s=10.0)
@@ -163,9 +167,9 @@ def epson() -> Iterator[Kind]:
 
 
 @contextmanager
-def softmotion() -> Iterator[Kind]:
+def softmotion(medium: str = "sim") -> Iterator[Kind]:
     """A simulated PLC with a mailbox."""
-    with served(SoftMotionSimulator(seed=3)) as url:
+    with served(SoftMotionSimulator(seed=3), medium) as url:
         yield Kind(
             lambda outcomes: robolink.connect(url, outcomes=outcomes),
             prepare=_switch_on,
@@ -188,6 +192,32 @@ def plc_map() -> Iterator[Kind]:
 
 
 @contextmanager
+def plc_symbols() -> Iterator[Kind]:
+    """A PLC accessed through a map of its variables, as over OPC UA; it does not move."""
+    bench = SymbolBench(EXAMPLES / "by-symbol.toml", identity="plc+opcua://contract")
+
+    def opened(outcomes: OutcomeLog | None) -> Controller:
+        client = LocalSymbolClient(bench.program, bench.identity, bench.clock)
+        log = outcomes or memory_journal(bench.identity).log(bench.identity)
+        return PlcMapController(client, bench.map, log)
+
+    yield Kind(opened, tool=min(bench.map.slots), without=("move", "select", "clear"))
+
+
+@contextmanager
+def plc_opcua() -> Iterator[Kind]:
+    """The same PLC behind an OPC UA server."""
+    path = EXAMPLES / "by-symbol.toml"
+    symbols = load_symbol_map(path)
+    with served(PlcSimulator(symbols, seed=3), "opcua", map_file=path) as url:
+        with robolink.connect(url) as controller:
+            confirm_whole_map(controller)
+        yield Kind(
+            lambda outcomes: robolink.connect(url, outcomes=outcomes), tool=min(symbols.slots)
+        )
+
+
+@contextmanager
 def third_kind() -> Iterator[Kind]:
     """A kind that another package supplies."""
     with BenchServer() as server:
@@ -199,5 +229,12 @@ def third_kind() -> Iterator[Kind]:
         yield Kind(opened)
 
 
-KINDS = {kind.__name__: kind for kind in (memory, epson, softmotion, plc_map, third_kind)}
-IMMOBILE = ("plc_map",)
+KINDS = {
+    kind.__name__: kind for kind in (memory, epson, softmotion, plc_map, plc_symbols, third_kind)
+}
+OVER_OPCUA: dict[str, Callable[[], AbstractContextManager[Kind]]] = {
+    "softmotion": partial(softmotion, "opcua"),
+    "plc_opcua": plc_opcua,
+}
+"""Kinds behind a server on a port, in real time."""
+IMMOBILE = ("plc_map", "plc_symbols", "plc_opcua")

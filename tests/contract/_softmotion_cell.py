@@ -20,7 +20,7 @@ from robolink.journal import Journal, memory_journal
 from robolink.model import MotionProfile, Path, Pose
 from robolink.timing import NS_PER_S, SystemClock
 
-BACKENDS: Final = ("sim", "modbus-tcp", "modbus-rtu", "can-virtual", "can-multicast")
+BACKENDS: Final = ("sim", "modbus-tcp", "modbus-rtu", "can-virtual", "can-multicast", "opcua")
 LINKS: Final = [
     pytest.param(name, marks=pytest.mark.soak if name == "can-virtual" else ()) for name in BACKENDS
 ]

@@ -253,6 +253,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.epson.controller.EpsonController.execute_raw": _unguarded,
     "robolink.controllers.ControllerCore.close": _nothing,
     "robolink.transport.tcp.TcpTransport.send": _sent_in_part,
+    "robolink.transport.opcua.client.OpcuaClient._require_may_write": _nothing,
 }
 _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
     "robolink_cli.wizard.views.offered.refusal": {
@@ -279,6 +280,9 @@ _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
     },
     "robolink.controllers.epson.answers.require_ready": {
         "robolink.controllers.epson.window.require_ready": _nothing,
+    },
+    "robolink.transport.opcua.server_certificate.require_pinned": {
+        "robolink.transport.opcua.session.require_pinned": _nothing,
     },
 }
 LEFT: Final[Mapping[str, Mapping[str, StandIn]]] = {

@@ -7,8 +7,9 @@ from robolink.testing import (
     READING_CHECKS,
     WRITING_CHECKS,
     WRITING_WHILE_MOVING_CHECKS,
+    outcomes,
 )
-from tests.contract._kinds import IMMOBILE, KINDS
+from tests.contract._kinds import IMMOBILE, KINDS, OVER_OPCUA
 
 STANDING = (*READING_CHECKS, *WRITING_CHECKS)
 MOVING = (*MOVING_CHECKS, *WRITING_WHILE_MOVING_CHECKS)
@@ -24,3 +25,12 @@ CASES = [
 def test_a_kind_of_controller_keeps_its_promises(kind, check):
     with KINDS[kind]() as cell:
         check(cell.subject)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", OVER_OPCUA)
+def test_a_kind_of_controller_keeps_its_promises_over_opc_ua(kind):
+    checks = STANDING if kind in IMMOBILE else (*STANDING, *MOVING)
+    with OVER_OPCUA[kind]() as cell:
+        broken = [f"{it.name}: {it.broken}" for it in outcomes(cell.subject, checks) if it.broken]
+    assert broken == []

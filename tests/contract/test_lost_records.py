@@ -12,7 +12,7 @@ from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord
 from robolink.serving import CallbackConversation, CallbackLimits
 from robolink.transaction import look, recover
-from tests.contract._kinds import KINDS
+from tests.contract._kinds import IMMOBILE, KINDS
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +63,7 @@ def refuses_everything(kind, controller):
 
 FIRST = [
     *((name, "write") for name in KINDS),
-    *((name, "move") for name in KINDS if name != "plc_map"),
+    *((name, "move") for name in KINDS if name not in IMMOBILE),
     *(("epson", act) for act in ("select", "output", "raw")),
     *(("softmotion", act) for act in ("jog", "output", "kinematics")),
 ]

@@ -7,6 +7,7 @@ import pytest
 
 from robolink.errors import (
     RejectedError,
+    RemoteProtocolError,
     TransportClosedError,
 )
 from robolink.transport import MailboxHead, open_mailbox_link, open_modbus, told_to
@@ -19,16 +20,28 @@ from tests.contract._mailbox_far_ends import (
     multicast_node,
     virtual_node,
 )
+from tests.contract._opcua_far_end import OpcuaFarEnd, opcua_server
 
 COMMAND = tuple(range(1000, 1064))
 RESPONSE = tuple(range(100, 212))
 SLOT = tuple(range(100, 136))
 
 
-@pytest.fixture(params=["tcp", "rtu", "rtu-echo", "virtual", "multicast"])
+@pytest.fixture(scope="module")
+def symbols():
+    """A server for all tests here."""
+    with opcua_server() as far_end:
+        yield far_end
+
+
+@pytest.fixture(params=["tcp", "rtu", "rtu-echo", "virtual", "multicast", "opcua"])
 def far_end(request, tmp_path):
     with ExitStack() as stack:
-        if request.param == "tcp":
+        if request.param == "opcua":
+            end = request.getfixturevalue("symbols")
+            end.reset()
+            yield end
+        elif request.param == "tcp":
             yield stack.enter_context(modbus_tcp())
         elif request.param.startswith("rtu"):
             echo = request.param == "rtu-echo"
@@ -71,8 +84,8 @@ def test_all_that_passes_is_told_to_a_trace(far_end):
         link.read_response()
         sent = b"".join(data for direction, data in told if direction == "sent")
         received = b"".join(data for direction, data in told if direction == "received")
-        # CANopen sends a word low byte first, and a frame holds seven bytes.
-        low_first = isinstance(far_end, CanopenFarEnd)
+        # CANopen and OPC UA send a word low byte first, and a frame of CAN holds seven bytes.
+        low_first = isinstance(far_end, CanopenFarEnd | OpcuaFarEnd)
         assert (b"\xe8\x03\xe9" if low_first else b"\x03\xe8\x03") in sent
         assert (b"\x64\x00\x65" if low_first else b"\x00\x64\x00") in received
         link.close()
@@ -118,6 +131,8 @@ def test_a_beat_is_the_heartbeat_word_alone(far_end, link):
     assert far_end.heartbeat() == 0x0102
     if isinstance(far_end, ModbusFarEnd):
         assert far_end.command() == [*COMMAND[:62], 0x0102, COMMAND[63]]
+    elif isinstance(far_end, OpcuaFarEnd):
+        assert far_end.command() == [0] * 64, "the array of the command is left alone"
 
 
 @pytest.mark.fault("F32", "F35")
@@ -143,6 +158,52 @@ def test_f35_each_exchange_over_modbus_is_one_request_for_registers(serial):
         (4, 112 + 14 * 36, 36),
         (4, 652, 4),
     ]
+
+
+@pytest.mark.fault("F32", "F35")
+def test_f35_each_exchange_over_opc_ua_is_one_request_for_a_whole_variable(symbols):
+    """A command is two: its heartbeat, which has to be there first, and its array."""
+    symbols.reset()
+    with closing(open_mailbox_link(symbols.url)) as link:
+        symbols.requests.clear()
+        link.write_command(COMMAND)
+        link.beat(1)
+        link.read_head()
+        link.read_response()
+        link.read_slot(15)
+        link.read_device()
+    assert symbols.requests == [
+        ("write", "heartbeat"),
+        ("write", "command"),
+        ("write", "heartbeat"),
+        ("read", "response"),
+        ("read", "response"),
+        ("read", "slots"),
+        ("read", "slots"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind"),
+    [
+        ("response", [1] * 111, "UInt16"),
+        ("response", [1] * 113, "UInt16"),
+        ("response", [1] * 112, "Int16"),
+        ("response", 1, "UInt16"),
+        ("slots", [1] * 543, "UInt16"),
+    ],
+    ids=["short", "long", "signed", "scalar", "slots"],
+)
+def test_a_variable_that_becomes_something_else_is_told_and_never_half_believed(
+    symbols, name, value, kind
+):
+    symbols.reset()
+    with closing(open_mailbox_link(symbols.url)) as link:
+        link.read_response()
+        symbols.put(name, value, kind)
+        read = link.read_response if name == "response" else lambda: link.read_slot(15)
+        with pytest.raises(RemoteProtocolError, match=name):
+            read()
 
 
 @pytest.mark.fault("F49")

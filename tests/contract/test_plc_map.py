@@ -2,12 +2,18 @@
 
 import socket
 from pathlib import Path
+from typing import Any
 
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
+from robolink_simulators.plc import (
+    PlcSimulator,
+    serve_plc,
+    serve_plc_line,
+    serve_plc_opcua,
+)
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
@@ -24,7 +30,7 @@ from robolink.errors import (
 )
 from robolink.methods import PointsSource
 from robolink.model import Verdict
-from robolink.register_maps import CommitKind, load_map
+from robolink.register_maps import CommitKind, SymbolMap, load_map, load_plc_map
 from robolink.runner import Question
 from robolink.testing import confirm_whole_map
 from robolink.transaction import recover
@@ -36,7 +42,13 @@ CELLS = (
     ("level-handshake", "modbus-tcp"),
     ("no-handshake", "modbus-tcp"),
     ("commit-bit", "modbus-rtu"),
+    ("by-symbol", "opcua"),
 )
+SERVERS: dict[str, Any] = {
+    "modbus-tcp": serve_plc,
+    "modbus-rtu": serve_plc_line,
+    "opcua": serve_plc_opcua,
+}
 NEW = ToolOffset(11.25, -3.125)
 
 
@@ -45,11 +57,18 @@ class Served:
 
     def __init__(self, name, wire="modbus-tcp"):
         self.path = MAPS / f"{name}.toml"
-        self.map = load_map(self.path)
+        self.map = load_plc_map(self.path)
         self.plc = PlcSimulator(self.map, seed=7)
-        on_line = wire == "modbus-rtu"
-        self.serve = serve_plc_line if on_line else serve_plc
-        self.patience_s = 0.8 if on_line else 0.3  # a line must be silent first
+        self.serve = SERVERS[wire]
+        self.patience_s = 0.3 if wire == "modbus-tcp" else 0.8  # a line must be silent first
+        if isinstance(self.map, SymbolMap):
+            (node,) = self.map.slots[1].nodes
+            self.place, self.whole = node, True
+            self.first_write = f"write {node.partition('.Application.')[2]}"
+        else:
+            slot = self.map.slots[1]
+            self.place, self.whole = f"(address {slot.span.start})", slot.contiguous
+            self.first_write = f"fc16 {slot.span.start}"
 
     def __enter__(self):
         self.host = self.serve(self.plc, self.path, clock=ScaledClock(10.0))
@@ -93,8 +112,7 @@ def test_a_write_is_read_back_and_receipted(served, controller):
 
 def test_a_preview_is_what_is_sent_first_and_sends_nothing(served, controller):
     (first, *_) = controller.tools.preview_write(1, NEW)
-    address = next(iter(served.map.slots[1].span))
-    assert f"(address {address})" in first
+    assert served.place in first
     assert served.plc.writes == []
     controller.tools.write(1, NEW, expected=ANY)
     assert controller.tools.preview_write(1, NEW) == ()
@@ -102,8 +120,7 @@ def test_a_preview_is_what_is_sent_first_and_sends_nothing(served, controller):
 
 @pytest.mark.fault("F43")
 def test_a_write_that_is_acknowledged_and_not_done_is_noticed(served, controller):
-    first = f"fc16 {served.map.slots[1].span.start}"
-    served.plc.faults.add(Fault(FaultAction.IGNORE_WRITE, match=first))
+    served.plc.faults.add(Fault(FaultAction.IGNORE_WRITE, match=served.first_write))
     with pytest.raises(ReadBackError, match="reads back as"):
         controller.tools.write(1, NEW, expected=ANY)
 
@@ -112,7 +129,7 @@ def test_a_write_that_is_acknowledged_and_not_done_is_noticed(served, controller
     "action", [FaultAction.DROP_REPLY, FaultAction.DISCONNECT, FaultAction.DISCONNECT_BEFORE]
 )
 def test_a_lost_answer_is_not_sent_again_and_settled_by_the_next_connection(served, action):
-    first = f"fc16 {served.map.slots[1].span.start}"
+    first = served.first_write
     with served.connect(timeout_s=served.patience_s) as controller:
         before = controller.tools.read(1)
         served.plc.faults.add(Fault(action, match=first))
@@ -127,7 +144,7 @@ def test_a_lost_answer_is_not_sent_again_and_settled_by_the_next_connection(serv
             asked = served.map.commit.kind is not CommitKind.NONE
             assert finding.verdict is (Verdict.NOT_FINISHED if asked else Verdict.NOT_APPLIED)
             assert controller.tools.read(1) == before
-        elif served.map.slots[1].contiguous:
+        elif served.whole:
             assert controller.tools.read(1) == NEW
             assert served.plc.program.in_force[1]["x"] == NEW.x_mm
         else:

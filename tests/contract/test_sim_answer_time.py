@@ -20,12 +20,12 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.testkit.media import MEDIA, served
-from robolink_simulators.testkit.operator import written_map
+from robolink_simulators.testkit.operator import written_map, written_symbol_map
 
 import robolink
 from robolink.errors import ConfigError, TransportBrokenError
 from robolink.model import MotionProfile, WorkBox
-from robolink.register_maps import load_map
+from robolink.register_maps import load_plc_map
 from robolink.timing import NS_PER_S
 from robolink.transport import parse_url
 from tests.contract.test_sim_hosting import raw
@@ -40,14 +40,14 @@ CARRIED_S = {("softmotion", "sim"): 0.001}
 """What an exchange with the mailbox takes in the process besides (``exchange_us``)."""
 
 
-def made(kind, folder, answer_ms=ANSWER_MS):
+def made(kind, folder, answer_ms=ANSWER_MS, medium=""):
     """Return a simulator with an answer time, and the file of its map."""
     if kind == "epson":
         return EpsonSimulator(seed=3, answer_ms=answer_ms), None
     if kind == "softmotion":
         return SoftMotionSimulator(seed=3, answer_ms=answer_ms), None
-    path = written_map(folder)
-    return PlcSimulator(load_map(path), seed=3, answer_ms=answer_ms), path
+    path = (written_symbol_map if medium.startswith("opcua") else written_map)(folder)
+    return PlcSimulator(load_plc_map(path), seed=3, answer_ms=answer_ms), path
 
 
 def measured_s(controller):
@@ -60,7 +60,7 @@ def measured_s(controller):
 
 @pytest.mark.parametrize(("kind", "medium"), LINKS, ids=lambda value: value)
 def test_each_exchange_takes_the_answer_time_on_every_link(kind, medium, tmp_path):
-    simulator, path = made(kind, tmp_path)
+    simulator, path = made(kind, tmp_path, medium=medium)
     with (
         served(simulator, medium, map_file=path) as url,
         robolink.connect(url) as controller,
@@ -246,7 +246,7 @@ def test_twenty_times_as_fast_it_takes_a_twentieth_of_real_time():
     ("kind", "medium"), [link for link in LINKS if link[1] != "sim"], ids=lambda value: value
 )
 def test_where_time_stands_still_an_exchange_lets_it_pass(kind, medium, tmp_path):
-    simulator, path = made(kind, tmp_path, answer_ms=2000)
+    simulator, path = made(kind, tmp_path, answer_ms=2000, medium=medium)
     clock = SteeredClock(0)
     with (
         served(simulator, medium, map_file=path, clock=clock) as url,

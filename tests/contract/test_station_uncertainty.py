@@ -1,11 +1,20 @@
 """A learnt station keeps its uncertainty, and results that use the station include it."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from robolink.calibration import AccuracyFacts, Pin, RowFact, assessed, solve_one_touch
 from robolink.calibration_run import AcceptanceCriteria
-from robolink.calibration_run._repeatability import Seating, seating_of, touch_sigma_z_mm
+from robolink.calibration_run._repeatability import (
+    MOST_CHANGES,
+    Seating,
+    seating_of,
+    touch_sigma_z_mm,
+)
 from robolink.errors import CalibrationError
+from robolink.journal import memory_journal
 from robolink.model import EntryKind, NewEntry, Pose, ToolOffset, plain_offset
 from robolink.stations import (
     Found,
@@ -118,6 +127,20 @@ def test_how_nozzles_sit_is_pooled_from_eight_changes_on_record(arm):
     assert found.changes == 8
     # X moved by 0.3 in each, Y by nothing; a kept Z does not show that Z seats alike.
     assert found.sigma_mm == pytest.approx((0.3 / 2**0.5, 0.3 / 2**0.5, 0.05))
+
+
+def test_no_more_of_a_long_record_is_read_than_counts():
+    read, log = [], memory_journal("a-long-record").log("a-long-record")
+    log.append(*(kept(1, 0.3 * (n % 2), -20.0, "kept", f"N-{n}") for n in range(200)))
+
+    def recorded(**wanted):
+        for entry in log.recorded(**wanted):
+            read.append(entry)
+            yield entry
+
+    controller: Any = SimpleNamespace(outcomes=SimpleNamespace(recorded=recorded))
+    assert seating_of(controller).changes == MOST_CHANGES
+    assert len(read) == MOST_CHANGES + 1
 
 
 def test_how_well_touches_repeat_in_height_is_pooled_from_ten_of_them(arm):

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
 
-from robolink import Secret
+from robolink import ANY, Secret, ToolOffset
 from robolink.controllers import stop_now
 from robolink.errors import (
     ConnectError,
@@ -204,6 +204,20 @@ def test_a_group_whose_client_died_is_brought_to_rest_and_held(plc):
     assert (status.running, status.paused) == (False, True)
     with plc.connect() as controller:
         assert controller.groups[0].pose().z_mm < here.z_mm + 15
+
+
+def test_a_beat_that_is_refused_holds_no_stop_back():
+    refused = PlcFault(PlcFaultAction.MODBUS_EXCEPTION, match="beat", code=6, every=1)
+    with served_plc("modbus-tcp") as cell, cell.connect(clock=cell.clock) as controller:
+        controller.tools.write(3, ToolOffset(1.0, 2.0, 3.0), expected=ANY)
+        cell.clock.advance(2.0)  # a beat is due
+        cell.simulator.faults.add(refused)
+        with pytest.raises(RejectedError):
+            controller.status()
+        cell.clock.advance(2.0)
+        controller.stop()
+        assert cell.commands[-1] == "STOP"
+        assert cell.simulator.faults.times_fired > 1
 
 
 def test_a_group_that_is_disabled_is_stopped_without_an_error(plc):

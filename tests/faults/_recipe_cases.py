@@ -11,7 +11,7 @@ from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._recipe_cell import RecipeCell
 from tests.faults._recipe_instants import Instants
 from tests.faults._recipes import EXAMPLES, ON_THE_PLC, TWO_NOZZLES, TWO_ON_THE_PLC
-from tests.faults._softmotion_recipe_cell import PlcRecipeCell
+from tests.faults._softmotion_recipe_cell import OpcuaRecipeCell, PlcRecipeCell
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Case:
         """
         path = folder / "recipe.toml"
         path.write_text(self.recipe)
-        words = ("recalibrate", str(path), "--assist", cell.url, *self.answers)
+        words = ("recalibrate", str(path), "--assist", cell.assist or cell.url, *self.answers)
         return cell.run(*words, instants=instants, asks=not self.answers)
 
 
@@ -63,4 +63,5 @@ CASES: Final = {
     "EPSON, two tools": Case(EpsonRecipeCell, TWO_NOZZLES, (1, 2)),
     "PLC, one tool": Case(PlcRecipeCell, ON_THE_PLC, (1,), ("--yes",)),
     "PLC, two tools": Case(PlcRecipeCell, TWO_ON_THE_PLC, (1, 2)),
+    "PLC over OPC UA, two tools": Case(OpcuaRecipeCell, TWO_ON_THE_PLC, (1, 2)),
 }

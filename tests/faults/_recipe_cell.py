@@ -45,6 +45,8 @@ class RecipeCell(ABC):
         before: The tools' earlier values.
         shows_its_tool: Whether it shows which tool is selected in every state.
         clock: The clock of all parts.
+        url: Of the controller.
+        assist: Of the simulated person, if that is another one.
         recipe_tools: The tools that the recipe changes.
         switched: The outputs that the run switched, with their last state, past the wire.
     """
@@ -62,8 +64,9 @@ class RecipeCell(ABC):
         self.switched: dict[int, bool] = {}
         self._hosted = simulator
         simulator.log = WireRecord(most=None)  # all of it, however long a run is
+        self.assist = ""
         self.url = self._register()
-        self.journal: Journal = memory_journal(self.url)
+        self.journal: Journal = memory_journal(self.url.partition("?")[0])
         self.outputs_before = self.outputs()
         self.settings_before = self.settings()
 

@@ -4,13 +4,15 @@ import signal
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
+import pytest
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.model import ToolOffset
-from robolink.protocols.mailbox import Six, from_frame, to_frame
+from robolink.protocols.mailbox import COMMAND, Opcode, Six, from_frame, to_frame
 from tests.faults._recipe_cell import RecipeCell
 
+_OPCODE: Final = COMMAND["opcode"].word
 _UNIT_UM: Final = 1000.0
 _OUTPUTS: Final = (8, 9, 10)
 _MAY: Final = frozenset(
@@ -23,12 +25,13 @@ _MAY: Final = frozenset(
 class PlcRecipeCell(RecipeCell):
     """A SoftMotion PLC. Each command carries its own speed, so there are no settings to restore."""
 
+    answer_ms = 0.0
     disturbances = ("e-stop", "drive fault", "permit")
     shows_its_tool = True
     before = {1: ToolOffset(12.0, -3.5, -20.0), 2: ToolOffset(12.4, -3.7, -20.0)}
 
     def __init__(self, recipe_tools: Sequence[int]) -> None:
-        self.simulator = simulator = SoftMotionSimulator(seed=1)
+        self.simulator = simulator = SoftMotionSimulator(seed=1, answer_ms=self.answer_ms)
         self._plc = simulator.plc
         self._written: list[int] = []
         simulator.world.change_nozzle(2)
@@ -137,3 +140,42 @@ class PlcRecipeCell(RecipeCell):
     def _commands(self) -> list[str]:
         sent = "write_command "
         return [text.split()[1] for text in self.requests() if text.startswith(sent)]
+
+
+class OpcuaRecipeCell(PlcRecipeCell):
+    """The same behind its OPC UA server."""
+
+    answer_ms = 4.0
+    _due = 0
+    """The number of movements that are asked for once the present command is written."""
+
+    def moves_asked(self) -> int:
+        """See :meth:`RecipeCell.moves_asked`; the beat before a movement belongs to it."""
+        return max(super().moves_asked(), self._due)
+
+    def _register(self) -> str:
+        # They take a second, so not for collection.
+        from robolink.transport.opcua.mailbox import OpcuaMailboxLink
+        from tests._stepped_opcua import UNSECURED, SteppedOpcua
+
+        self.assist = super()._register()
+        self._patch = pytest.MonkeyPatch()
+        served = SteppedOpcua(self.simulator, self.clock)
+        self._patch.setattr("robolink.transport.opcua.mailbox.open_client", served.client)
+        self._patch.setattr(OpcuaMailboxLink, "durable", False)  # it ends with the process
+        write = OpcuaMailboxLink.write_command
+
+        def written(link: OpcuaMailboxLink, words: Sequence[int]) -> None:
+            moves = Opcode(words[_OPCODE]).name.startswith("MOVE")
+            self._due = super(OpcuaRecipeCell, self).moves_asked() + moves
+            try:
+                write(link, words)
+            finally:
+                self._due = 0
+
+        self._patch.setattr(OpcuaMailboxLink, "write_command", written)
+        return f"softmotion+opcua://{self.name}?{UNSECURED}"
+
+    def _unregister(self) -> None:
+        self._patch.undo()
+        super()._unregister()

@@ -1,7 +1,7 @@
 """A PLC's command blocks and answers when lost, doubled, torn or at the limit of their numbers.
 
-Over Modbus TCP, Modbus RTU and CANopen as real links; the PLC itself counts the movements begun and
-the changes of a slot.
+Over Modbus TCP, Modbus RTU, CANopen and OPC UA as real links; the PLC itself counts the movements
+begun and the changes of a slot.
 """
 
 from contextlib import closing
@@ -19,7 +19,7 @@ from robolink.transport import open_mailbox_link
 from tests.contract._softmotion_cell import OWNER_SILENCE_S, QUICK, above, served
 from tests.unit._mailbox_client import MailboxClient
 
-LINKS = ["modbus-tcp", "modbus-rtu", "can-virtual"]
+LINKS = ["modbus-tcp", "modbus-rtu", "can-virtual", "opcua"]
 SLOT = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0)
 TIMEOUT_S = 0.8
@@ -53,6 +53,8 @@ def only(*links):
             pytest.param(link, how, marks=pytest.mark.soak)
             for link, how in (
                 ("modbus-tcp", PlcFaultAction.GARBLE_REPLY),
+                ("opcua", PlcFaultAction.DROP_REPLY),
+                ("opcua", PlcFaultAction.GARBLE_REPLY),
                 ("modbus-rtu", PlcFaultAction.DROP_REPLY),
                 ("can-virtual", PlcFaultAction.DROP_REPLY),
                 ("can-virtual", PlcFaultAction.GARBLE_REPLY),

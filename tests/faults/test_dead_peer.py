@@ -7,6 +7,7 @@ shows nothing: there the next request does. ``pytest -s`` shows the measured tim
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
@@ -35,6 +36,7 @@ _LOAD_S = 0.3
 TCP = {
     "EPSON, TCP": ("epson", "--tcp", "{address}:0"),
     "Modbus TCP": ("softmotion", "--modbus-tcp", "{address}:0"),
+    "OPC UA": ("softmotion", "--opcua", "{address}:0"),
 }
 
 
@@ -88,7 +90,7 @@ def in_flight(url: str, cut: Callable[[], None]) -> dict[str, float]:
 @pytest.mark.parametrize("kind", TCP)
 def test_a_dead_peer_is_noticed_while_nothing_is_asked(kind):
     with far_computer(*TCP[kind]) as computer:
-        url = parse_url(computer.url)
+        url = replace(parse_url(computer.url), options={})
         clock = SystemClock()
         deadline = Deadline.after(clock, 5.0)
         transport = TcpTransport(dial(url, timeout_s=5.0, deadline=deadline), url, clock)

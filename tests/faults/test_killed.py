@@ -55,6 +55,7 @@ LINES: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = 
     "PLC over Modbus TCP": partial(plc_change_cell, wire="modbus-tcp"),
     "PLC over Modbus RTU": partial(plc_change_cell, wire="modbus-rtu"),
     "PLC over CANopen": partial(plc_change_cell, wire="can-multicast"),
+    "PLC over OPC UA": partial(plc_change_cell, wire="opcua"),
     "register map over Modbus TCP": partial(mapped_change_cell, wire="modbus-tcp"),
 }
 
@@ -321,6 +322,9 @@ def test_f79_a_change_killed_anywhere_and_delivered_again_is_made_once(tmp_path,
     print(f"{len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
 
 
+LEFT_TO_SOAK: Final = ("RTU", "CANopen", "OPC UA", "register map over Modbus TCP")
+
+
 def four_of(steps: list[Step]) -> list[Step]:
     """Return the write of tool 1, before and after, and so the commit that ends the change."""
     wire = [s for s in steps if isinstance(s, WireStep) and s.request.startswith(WRITES)]
@@ -330,10 +334,7 @@ def four_of(steps: list[Step]) -> list[Step]:
 
 @pytest.mark.parametrize(
     "line",
-    [
-        pytest.param(name, marks=SOAK if name[-3:] in ("RTU", "pen") or "map" in name else ())
-        for name in LINES
-    ],
+    [pytest.param(name, marks=SOAK if name.endswith(LEFT_TO_SOAK) else ()) for name in LINES],
 )
 @pytest.mark.fault("F57", "F58")
 def test_f57_f58_a_process_killed_at_four_instants_is_recovered_on_every_line(tmp_path, line):

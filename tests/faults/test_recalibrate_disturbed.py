@@ -55,6 +55,9 @@ MATTERS: Final = re.compile(
 POLLS: Final = re.compile("wait|(request|answer) (read_head|beat)")
 """The repeated acts of a PLC driver during a movement."""
 
+OPCUA_POLLS: Final = re.compile(f"{POLLS.pattern}|(request|answer) read_response")
+"""The same over OPC UA, where a look at the head reads the whole response."""
+
 SHOWS_LATER: Final = re.compile(r"commit|answer \d+: (read|beat)")
 """A disturbance while the driver stores something, or just after a PLC was read, shows with the
 next exchange, which is an instant of its own.
@@ -94,7 +97,7 @@ def check(worlds: Worlds, disturbance: Disturbance, ended: Ended) -> None:
 def steps_of(name: str, how: str, whole: list[Instant]) -> list[Instant]:
     """Return the instants of a whole run at which one disturbance occurs."""
     if name.startswith("PLC"):
-        whole = without_inner_polls(whole, POLLS)
+        whole = without_inner_polls(whole, OPCUA_POLLS if "OPC UA" in name else POLLS)
     if how != CTRL_C:
         whole = [instant for instant in whole if not SHOWS_LATER.match(str(instant))]
     steps = chosen(whole, MATTERS, turn=TESTS.index((name, how)))

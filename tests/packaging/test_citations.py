@@ -36,7 +36,7 @@ GAP = r"\s+(?:(?:#|//|\*)\s+)?"
 
 NUMBER = r"(?:F\d\d|\d{1,2}(?:\.\d{1,2})?)(?![\d/]|\.\d)"
 CITED = re.compile(
-    r"(?<![\w/])(?P<page>docs/(?:[\w./-]*\.(?:md|json)|decisions/\d{4}[\w-]*))"
+    r"(?P<page>docs/(?<![\w/]docs/)(?:[\w./-]*\.(?:md|json)|decisions/\d{4}[\w-]*))"
     rf"(?:{GAP}(?P<numbers>{NUMBER}(?:,{GAP}{NUMBER})*)(?!\w)"
     rf'|,{GAP}"(?P<heading>[^"]+)")?'
 )
@@ -44,16 +44,16 @@ LINK = re.compile(r"\]\((?![a-z]+:)(?P<page>[^)#\s]*)(?:#(?P<anchor>[^)\s]+))?\)
 FAULTS = re.compile(r"\((?:[^()]{0,60}[;,] )?(?P<numbers>F\d\d(?:, F\d\d)*)[).;]")
 FILE = re.compile(r"`((?:robolink|cli|simulators|tests|docs|companions)/[\w./*-]*)`")
 BARE = re.compile(r"(?<![\w./{}-])(?P<name>[a-z][\w-]*\.md)(?![\w#])")
-UNKNOWN = re.compile(rf"\bdesign{GAP}(?:parts?{GAP})?\d")
+UNKNOWN = re.compile(rf"design(?<!\wdesign){GAP}(?:parts?{GAP})?\d")
 
 
-def texts() -> Iterator[tuple[Path, str]]:
+@pytest.fixture(scope="module")
+def texts() -> list[tuple[Path, str]]:
+    """The text of every file that may cite another, read once."""
     files = [ROOT / "README.md", ROOT / "CHANGELOG.md"]
     for room in ROOMS:
         files += sorted(f for f in (ROOT / room).rglob("*") if f.suffix in SUFFIXES)
-    for file in files:
-        if file != Path(__file__):
-            yield file, file.read_text(encoding="utf-8")
+    return [(file, file.read_text(encoding="utf-8")) for file in files if file != Path(__file__)]
 
 
 def slug(heading: str) -> str:
@@ -103,13 +103,13 @@ def wrong_links(file: Path, text: str) -> Iterator[str]:
             yield f"{found['page']} has no heading #{found['anchor']}"
 
 
-def test_every_citation_leads_to_a_heading():
-    wrong = [f"{f.relative_to(ROOT)}: {w}" for f, t in texts() for w in wrong_citations(t)]
+def test_every_citation_leads_to_a_heading(texts):
+    wrong = [f"{f.relative_to(ROOT)}: {w}" for f, t in texts for w in wrong_citations(t)]
     assert not wrong, "\n".join(wrong)
 
 
-def test_every_link_leads_to_a_heading():
-    pages = ((f, t) for f, t in texts() if f.suffix == ".md")
+def test_every_link_leads_to_a_heading(texts):
+    pages = ((f, t) for f, t in texts if f.suffix == ".md")
     wrong = [f"{f.relative_to(ROOT)}: {w}" for f, t in pages for w in wrong_links(f, t)]
     assert not wrong, "\n".join(wrong)
 
@@ -136,8 +136,8 @@ def test_the_picture_of_the_rooms_is_that_of_the_import_contracts():
     assert subprocess.run(drawn, check=False).returncode == 0
 
 
-def test_no_page_is_cited_by_its_name_alone_but_one_that_lies_beside_it_or_in_docs():
-    named = [(f, m["name"]) for f, t in texts() for m in BARE.finditer(t)]
+def test_no_page_is_cited_by_its_name_alone_but_one_that_lies_beside_it_or_in_docs(texts):
+    named = [(f, m["name"]) for f, t in texts for m in BARE.finditer(t)]
     wrong = {
         f"{file.relative_to(ROOT)}: {name}"
         for file, name in named
@@ -147,15 +147,15 @@ def test_no_page_is_cited_by_its_name_alone_but_one_that_lies_beside_it_or_in_do
     assert not wrong, "\n".join(sorted(wrong))
 
 
-def test_every_number_of_a_fault_is_in_the_catalogue():
+def test_every_number_of_a_fault_is_in_the_catalogue(texts):
     known = numbers(ROOT / "docs/reference/faults.md")
-    cited = {n for _, t in texts() for m in FAULTS.finditer(t) for n in m["numbers"].split(", ")}
+    cited = {n for _, t in texts for m in FAULTS.finditer(t) for n in m["numbers"].split(", ")}
     assert cited
     assert cited <= known
 
 
-def test_nothing_cites_a_document_that_is_not_here():
-    wrong = [f"{f.relative_to(ROOT)}: {m[0]}" for f, t in texts() for m in UNKNOWN.finditer(t)]
+def test_nothing_cites_a_document_that_is_not_here(texts):
+    wrong = [f"{f.relative_to(ROOT)}: {m[0]}" for f, t in texts for m in UNKNOWN.finditer(t)]
     assert not wrong, "\n".join(wrong)
 
 
@@ -204,8 +204,17 @@ class Role(NamedTuple):
     target: str
 
 
-def modules() -> Iterator[tuple[str, ast.Module]]:
-    """Yield every module with a role, by its dotted name; others have nothing to check."""
+class Cited(NamedTuple):
+    """What the docstrings of a module name, and what it imports; a parse tree is large."""
+
+    roles: list[Role]
+    imported: dict[str, tuple[str, str]]
+
+
+@cache
+def modules() -> dict[str, Cited]:
+    """Return every module with a role, by its dotted name; others have nothing to check."""
+    found = {}
     for package in PACKAGES:
         top = (ROOT / package).parent
         for path in sorted((ROOT / package).rglob("*.py")):
@@ -213,7 +222,9 @@ def modules() -> Iterator[tuple[str, ast.Module]]:
             name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
             text = path.read_text(encoding="utf-8")
             if ROLE.search(text):
-                yield name, ast.parse(text)
+                tree = ast.parse(text)
+                found[name] = Cited(list(roles(name, tree)), imported(tree))
+    return found
 
 
 def texts_with_roles(
@@ -281,7 +292,7 @@ def absolute(names: list[str]) -> bool:
     return False
 
 
-def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
+def leads_somewhere(role: Role) -> bool:
     """Return whether a role's target exists."""
     names = role.target.split(".")
     if names[0] in {package.rpartition("/")[2] for package in PACKAGES} or len(names) > 2:
@@ -293,7 +304,7 @@ def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
             owner = getattr(owner, one)
         if followed(owner, names):
             return True
-    if names[0] in (known := imported(trees[role.module])):
+    if names[0] in (known := modules()[role.module].imported):
         module, name = known[names[0]]
         return absolute([*module.split("."), name, *names[1:]])
     packages = role.module.split(".")
@@ -301,29 +312,24 @@ def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
     return any(followed(import_module(package), names) for package in around) or absolute(names)
 
 
-@cache
-def trees() -> dict[str, ast.Module]:
-    """Return these modules; not at import, where each process of the suite would parse them all."""
-    return dict(modules())
-
-
 @pytest.mark.parametrize("package", [package.rpartition("/")[2] for package in PACKAGES])
 def test_what_a_docstring_names_is_there(package):
     found = [
         role
-        for name, tree in trees().items()
+        for name, module in modules().items()
         if name.split(".")[0] == package
-        for role in roles(name, tree)
+        for role in module.roles
     ]
     assert len(found) > 20
-    assert [role for role in found if not leads_somewhere(role, trees())] == []
+    assert [role for role in found if not leads_somewhere(role)] == []
 
 
-def without_a_page(text: str, pages: dict[str, dict[str, object]]) -> list[str]:
+def without_a_page(text: str, packages: set[str], names: set[str]) -> list[str]:
     """Return the targets with a whole path in a text that no page of the API describes."""
-    names = {f"{package}.{name}" for package in pages for name in pages[package]}
     whole = [target for target in targets(text) if target.startswith("robolink")]
-    return [one for one in whole if one not in pages and not {one, one.rpartition(".")[0]} & names]
+    return [
+        one for one in whole if one not in packages and not {one, one.rpartition(".")[0]} & names
+    ]
 
 
 def members(thing: object) -> Iterator[object]:
@@ -339,8 +345,9 @@ def test_what_a_page_of_the_api_names_has_a_page():
     things = [thing for named in pages.values() for thing in named.values()]
     for one in (*things, *(member for thing in things for member in members(thing))):
         texts.append(getattr(one, "__doc__", "") or "")
-    assert [one for text in texts for one in without_a_page(text, pages)] == []
-    assert without_a_page("Says :mod:`robolink.locale.languages`.", pages)
+    known = {*pages}, {f"{package}.{name}" for package in pages for name in pages[package]}
+    assert [one for text in texts for one in without_a_page(text, *known)] == []
+    assert without_a_page("Says :mod:`robolink.locale.languages`.", *known)
 
 
 def test_what_a_page_links_to_is_built_with_it():
@@ -371,7 +378,7 @@ def test_what_a_page_links_to_is_built_with_it():
     ],
 )
 def test_a_wrong_name_is_found(module, owners, target, there):
-    assert leads_somewhere(Role(module, owners, target), trees()) is there
+    assert leads_somewhere(Role(module, owners, target)) is there
 
 
 # Nobody reads a house full of paper: the number of pages and records, and the length of two.

@@ -166,6 +166,42 @@ def test_the_export_writes_all_files_and_keeps_changed_ones(tmp_path, capsys):
     assert "OP_WRITE_TOOL" in changed.read_text()
 
 
+def test_a_folder_holds_the_files_of_one_link(tmp_path, capsys):
+    of_registers = set(plc_texts(ExportProfile.TOOLS, 0))
+    of_symbols = set(plc_texts(ExportProfile.TOOLS, 0, opcua=True))
+    assert of_symbols - of_registers == {"RL_Symbols.st"}
+    assert of_registers - of_symbols == {
+        "register_map.csv",
+        "register_map.md",
+        "robolink_mailbox.eds",
+    }
+    notes = tmp_path / "ours.txt"
+    notes.write_text("kept")
+    command = ["plc", "export", str(tmp_path)]
+    for link, files in (["--opcua"], of_symbols), ([], of_registers), (["--opcua"], of_symbols):
+        for stale in {path.name for path in tmp_path.iterdir()} - files - {notes.name}:
+            assert main.run([*command, *link]) == 2
+            told = capsys.readouterr().err
+            assert "another export" in told
+            assert "--force" in told
+            assert (tmp_path / stale).exists()
+        assert main.run([*command, *link, "--force"]) == 0
+        assert {path.name for path in tmp_path.iterdir()} == files | {notes.name}
+    assert f"removed {tmp_path / 'register_map.md'}" in capsys.readouterr().out
+    assert main.run([*command, "--opcua"]) == 0
+
+
+def test_a_file_of_the_other_link_that_cannot_be_removed_is_told(tmp_path, capsys, monkeypatch):
+    assert main.run(["plc", "export", str(tmp_path), "--opcua"]) == 0
+
+    def refused(path, **_options):
+        raise PermissionError(13, "not yours", str(path))
+
+    monkeypatch.setattr(Path, "unlink", refused)
+    assert main.run(["plc", "export", str(tmp_path), "--force"]) == 2
+    assert "RL_Symbols.st cannot be removed: not yours" in " ".join(capsys.readouterr().err.split())
+
+
 def test_the_export_as_a_document(tmp_path, capsys):
     assert main.run(["plc", "export", str(tmp_path), "--profile", "full", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

@@ -24,7 +24,12 @@ from robolink.protocols.mailbox import (
     ExportProfile,
     Kinematics,
 )
-from robolink.protocols.mailbox.exports import PROGRAM_FILES, PlcopenSchema, program_texts
+from robolink.protocols.mailbox.exports import (
+    PROGRAM_FILES,
+    SYMBOL_LIST,
+    PlcopenSchema,
+    program_texts,
+)
 
 FULL, TOOLS = ExportProfile.FULL, ExportProfile.TOOLS
 COUPLED = "Kin_Gantry3+Kin_CAxis"
@@ -41,15 +46,18 @@ def every_text():
             texts = program_texts(profile, kinematics=kinematics, read_modes=modes)
             for name, text in texts.items():
                 yield pytest.param(name, text, id=f"{profile}-{kinematics}-{name}")
+        for name, text in program_texts(profile, opcua=True).items():
+            yield pytest.param(name, text, id=f"{profile}-opcua-{name}")
 
 
 @pytest.mark.parametrize(("name", "text"), list(every_text()))
 def test_every_text_is_complete_and_under_0bsd(name, text):
     assert "SPDX-License-Identifier: 0BSD" in text
     assert text.isascii()
-    left = ("full:", "kinematics:", "read tool:", "from memory:", "_SYMBOL", "_TYPE;", "coupled:")
+    left = ["full:", "kinematics:", "read tool:", "from memory:", "_SYMBOL", "_TYPE;", "coupled:"]
+    left += ["symbols:", "registers:"]
     assert [mark for mark in left if mark in text] == []
-    parse(name, text, dict(PROGRAM_SOURCES)[name])
+    parse(name, text, dict(PROGRAM_SOURCES).get(name, TextDialect.CODESYS))
 
 
 @pytest.mark.parametrize("profile", list(ExportProfile))
@@ -280,6 +288,39 @@ def test_the_name_of_the_axis_group_is_replaced_without_a_pin():
         assert renamed.count("AxisGroup := Robot") == 2
 
 
+PUBLISHED = {
+    "command": ("readwrite", "ARRAY [0..63] OF UINT"),
+    "heartbeat": ("readwrite", "UINT"),
+    "response": ("read", "ARRAY [0..113] OF UINT"),
+    "slots": ("read", "ARRAY [0..543] OF UINT"),
+}
+
+
+@pytest.mark.parametrize("profile", list(ExportProfile))
+def test_a_program_for_opc_ua_publishes_its_arrays_and_has_no_address(profile):
+    texts = plc_texts(profile, 0, opcua=True)
+    found = re.findall(r"\{attribute 'symbol' := '(\w+)'\}\s+(\w+) : ([^;]+);", texts[SYMBOL_LIST])
+    assert {name: (right, kind) for right, name, kind in found} == PUBLISHED
+    root = ElementTree.fromstring(texts["robolink_program.xml"].encode())
+    lists = {one.get("name"): one for one in root.iter(f"{XML}globalVars")}
+    shown = lists["RL_Symbols"]
+    assert [v.get("name") for v in shown.iter(f"{XML}variable")] == list(PUBLISHED)
+    (plain_text,) = shown.iter(f"{XML}InterfaceAsPlainText")
+    assert "".join(plain_text.itertext()) == texts[SYMBOL_LIST]
+    assert [v for v in root.iter(f"{XML}variable") if v.get("address")] == []
+    assert not any("%" in COMMENT.sub("", texts[name]) for name in PROGRAM_FILES)
+    told = {name for text in texts.values() for name in GLOBAL.findall(plain(text))}
+    assert SYMBOL_LIST.partition(".")[0] not in told
+    names = declared_names(texts[SYMBOL_LIST])
+    assert sorted(names) == sorted(PUBLISHED)
+    assert not [n for n in names if n.upper() in RESERVED_WORDS or is_vendor_word(n.upper())]
+
+
+def test_a_program_for_registers_has_nothing_of_opc_ua():
+    for text in plc_texts(FULL, 0).values():
+        assert "RL_Symbols" not in text
+
+
 def test_the_unit_is_told_as_a_real():
     made = StructuredProgram([SourceText(CORE, program_texts(FULL)[CORE])], "RL_LrealToReal")
     for unit_um in (1000.0, 1.0, 25400.0, 25.4, 0.3, 1e6, 123456.789, 1e-30):
@@ -289,9 +330,9 @@ def test_the_unit_is_told_as_a_real():
         assert (made.value("low"), made.value("high")) == words
 
 
-@pytest.mark.parametrize("name", LISTS)
+@pytest.mark.parametrize("name", [*LISTS, SYMBOL_LIST, PROGRAM_FILES[-1]])
 def test_a_foreign_parser_reads_the_lists(name):
-    assert parse_source_code(program_texts(FULL)[name]).exception is None
+    assert parse_source_code(program_texts(FULL, opcua=True)[name]).exception is None
 
 
 @pytest.mark.soak

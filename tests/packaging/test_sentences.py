@@ -1,25 +1,154 @@
 """The catalogue of sentences: complete, translated, and without two wordings of one message."""
 
+import ast
 import io
+import logging
 import re
-import subprocess
-import sys
-from dataclasses import fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from string import Formatter
 
 import pytest
+from babel.messages.frontend import CommandLineInterface
 from babel.messages.pofile import read_po
 from robolink_cli.console.tables import columns, filled
 
+import robolink
 from robolink.model import ControllerState, ControllerStatus, Hand
 from robolink.report._markup import plain
 from tests.packaging._near_copies import near_copies, reviewed, sentences
-from tools.sentences import collect
+from tools.sentences import HOLDS_ONE, collect, collected
+
+# Every sentence goes through one function, in a form that can be collected and filled.
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
+
+
+@dataclass(frozen=True)
+class Said:
+    """The sentences of a module; its parse tree is large."""
+
+    path: Path
+    collected: Sequence[object]
+    """As ``make messages`` collects them."""
+    calls: list[ast.Call]
+    too_early: list[int]
+    """Lines in which one is translated before the language is known."""
+
+
+@pytest.fixture(scope="module")
+def modules():
+    """Every module of the sources with a sentence, by its text: each is parsed once."""
+    found = {}
+    for path in sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+        source = path.read_bytes()
+        if HOLDS_ONE.search(source):
+            nodes = list(ast.walk(tree := ast.parse(source)))
+            said = list(collected(nodes, ("tr", "declared")))
+            found[source] = Said(path, said, list(calls(nodes)), list(too_early(tree, nodes)))
+    return found
+
+
+def calls(nodes):
+    for node in nodes:
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "declared"):
+            yield node
+
+
+def when_imported(top):
+    """Yield the code that runs at import: the bodies of functions do not."""
+    waiting = [top]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            defaults = [one for one in node.args.kw_defaults if one is not None]
+            waiting += [*node.decorator_list, *node.args.defaults, *defaults]
+        elif not isinstance(node, ast.Lambda):
+            waiting += ast.iter_child_nodes(node)
+
+
+def too_early(tree, nodes):
+    """Yield the calls of ``tr`` at import, and those whose text click keeps."""
+    kept = (
+        node.value
+        for node in nodes
+        if isinstance(node, ast.keyword) and node.arg in ("help", "short_help", "epilog")
+    )
+    for node in (*when_imported(tree), *kept):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "tr":
+            yield node.lineno
+
+
+def placeholders(sentence):
+    """Return the names in braces; other text in braces is text."""
+    return set(re.findall(r"(?<!{){([a-z_]\w*)[^{}]*}", sentence))
+
+
+def test_every_sentence_is_a_literal_that_gets_exactly_its_values(modules):
+    wrong, seen = [], 0
+    for module in modules.values():
+        for call in module.calls:
+            seen += 1
+            place = f"{module.path.relative_to(ROOT)}:{call.lineno}"
+            (sentence,) = call.args
+            if not isinstance(sentence, ast.Constant):
+                wrong.append(f"{place}: not a literal, cannot be collected")
+                continue
+            given = {keyword.arg for keyword in call.keywords}
+            wanted = placeholders(str(sentence.value))
+            if None not in given and wanted != given:  # **values cannot be counted here
+                wrong.append(f"{place}: the sentence wants {wanted}, gets {given}")
+    assert not wrong
+    assert seen > 1000
+
+
+def test_nothing_is_translated_before_the_language_is_known(modules):
+    wrong = [
+        f"{module.path.relative_to(ROOT)}:{line}: declared(...) here, spoken(...) where it is shown"
+        for module in modules.values()
+        for line in module.too_early
+    ]
+    assert not wrong
+
+
+def test_what_would_be_translated_too_early_is_found():
+    source = (
+        'A = tr("a")\nclass B:\n    c = {1: tr("c")}\n@option(help=tr("d"))\ndef f(x=tr("x")):\n'
+        '    g = option(help=tr("g"))\n    return tr("no")\n'
+    )
+    tree = ast.parse(source)
+    assert sorted(set(too_early(tree, ast.walk(tree)))) == [1, 3, 4, 5, 6]
+
+
+# A sentence of the library names the next step in the words of the program that shows it.
+
+LIBRARY = Path(robolink.__file__).parent
+OPTION = re.compile(r"(?<![\w-])--[a-z]")
+
+
+def own_sentences(module):
+    """Yield a module's sentences for people, among its calls."""
+    for node in module.calls:
+        if node.func.id == "tr" and isinstance(node.args[0], ast.Constant):
+            yield node.args[0].value
+
+
+def test_no_sentence_of_the_library_names_an_option_of_the_command_line(modules):
+    found = [
+        (str(module.path.relative_to(LIBRARY)), text)
+        for module in modules.values()
+        if module.path.is_relative_to(LIBRARY)
+        for text in own_sentences(module)
+        if OPTION.search(text)
+    ]
+    assert found == []
+
 
 # The catalogue of sentences is complete.
 
-ROOT = Path(__file__).parents[2]
 CATALOGUE = ROOT / "robolink" / "locale" / "robolink.pot"
 
 
@@ -30,19 +159,20 @@ def recipe():
     return line.split()
 
 
-def test_the_catalogue_holds_what_the_sources_say(tmp_path):
+def test_the_catalogue_holds_what_the_sources_say(modules, tmp_path, monkeypatch):
     fresh = tmp_path / "robolink.pot"
     options = [
         f"--output-file={fresh}" if option.startswith("--output-file") else option
         for option in recipe()
     ]
-    subprocess.run(
-        [sys.executable, "-m", "babel.messages.frontend", *options],
-        cwd=ROOT,
-        check=True,
-        capture_output=True,
-        timeout=50,
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(logging.getLogger("babel"), "handlers", [])
+    known = {text: module.collected for text, module in modules.items()}
+    # Babel calls it for each module of the sources, which are parsed already.
+    monkeypatch.setattr(
+        "tools.sentences.collect", lambda file, *_, **__: known.get(file.read(), [])
     )
+    CommandLineInterface().run(["pybabel", *options])
     assert fresh.read_text() == CATALOGUE.read_text(), "run: make messages"
 
 

@@ -19,6 +19,7 @@ LINKS = {
     CellKind.MODBUS_TCP: LinkKind.MODBUS_TCP,
     CellKind.MODBUS_RTU: LinkKind.MODBUS_RTU,
     CellKind.CANOPEN: LinkKind.CAN,
+    CellKind.OPCUA: LinkKind.OPCUA,
     CellKind.REGISTER_MAP: LinkKind.PLC_RTU,
 }
 BY_REQUEST = {Hindrance.WIRE, Hindrance.LINE, Hindrance.MACHINE, Hindrance.PRODUCTION}
@@ -41,8 +42,9 @@ def is_told_instant(one):
     )
 
 
-def test_twenty_seeds_bring_every_kind_of_cell():
-    assert {drawn_history(seed, 1).kind for seed in range(20)} == {*CellKind}
+def test_twenty_seeds_bring_every_kind_of_cell_that_is_not_asked_for_by_name():
+    drawn = {drawn_history(seed, 1).kind for seed in range(20)}
+    assert drawn == {*CellKind} - {CellKind.OPCUA}
 
 
 @pytest.mark.parametrize("kind", CellKind)

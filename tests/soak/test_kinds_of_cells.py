@@ -62,6 +62,7 @@ def test_one_seed_is_one_history_in_every_process_and_kind(kind):
         (CellKind.MODBUS_TCP, UNMARKED_MOVE, "MovesOnce"),
         (CellKind.MODBUS_RTU, UNMARKED_MOVE, "MovesOnce"),
         (CellKind.CANOPEN, UNMARKED_MOVE, "MovesOnce"),
+        (CellKind.OPCUA, UNMARKED_MOVE, "MovesOnce"),
         (CellKind.REGISTER_MAP, UNMARKED_WRITE, "OnlyWantedValues"),
         (CellKind.PROGRAM, UNMARKED_VALUE, "NothingWithoutRecord"),
     ],

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.plc import PlcSimulator
-from robolink_simulators.plc.program import OutsideError
+from robolink_simulators.plc.memory import OutsideError
 
 from robolink.controllers import PlcMapController
 from robolink.errors import RejectedError, TransportTimeoutError

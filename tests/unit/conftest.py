@@ -1,12 +1,13 @@
 """A client without a socket, for tests of the simulated EPSON controller."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
 
 from tests.unit._mailbox_programs import mailbox_program as mailbox_program
 from tests.unit._mailbox_programs import offer_programs
+from tests.unit._opcua_far_end import FarEnd, far_end
 
 S = 1_000_000_000
 
@@ -48,6 +49,13 @@ class Client:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Parametrize tests of more than one module."""
     offer_programs(metafunc)
+
+
+@pytest.fixture(scope="session")
+def opcua_served() -> Iterator[FarEnd]:
+    """Serve a mailbox over OPC UA; one for all, because asyncua's address space takes long."""
+    with far_end() as one:
+        yield one
 
 
 @pytest.fixture

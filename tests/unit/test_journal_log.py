@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.errors import JournalError
-from robolink.journal import ChainVerification, memory_journal
+from robolink.journal import ChainVerification, memory_journal, open_journal
 from robolink.journal.store.statements import COLUMNS as STORED
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Signature, new_operation
 
@@ -385,3 +385,51 @@ def test_a_marker_is_whole_however_its_details_were_given(log, given, read):
     log.begin(Marker("a", MarkerKind.MOVE, "Move", "2025-01-01T00:00:00+00:00", given))
     (found,) = log.open_markers()
     assert json.dumps(found.details, sort_keys=True) == json.dumps(read, sort_keys=True)
+
+
+def held(journal):
+    """Return the definitions of all tables, with their rows."""
+    with journal._store.read() as tables:
+        defined = tables.connection.rows("SELECT name, type, sql FROM sqlite_master ORDER BY name")
+        return [
+            (*one, tables.connection.table(one[0]) if one[1] == "table" else None)
+            for one in defined
+        ]
+
+
+def test_a_journal_in_memory_begins_as_one_in_a_file_and_shares_nothing(journal, tmp_path):
+    file = open_journal(str(tmp_path / "file.db"))
+    new = held(file)
+    assert held(journal) == new
+    log = journal.log(IDENTITY)
+    log.begin(marker())
+    log.clear("a", NewEntry(EntryKind.DONE, operation="a", tool=3))
+    log.begin(marker("b"))
+    other = memory_journal(new_operation())
+    assert held(other) == new
+    other.log(IDENTITY).begin(marker("c"))
+    assert [one.operation for one in log.open_markers()] == ["b"]
+    assert journal.verify().problems == ()
+    journal.close()  # memory is forgotten
+    assert held(journal) == new
+    other.close()
+    file.close()
+
+
+def test_journals_in_memory_are_begun_by_many_threads_at_once():
+    gate, begun = threading.Barrier(8), []
+
+    def begin():
+        gate.wait()
+        for _ in range(5):
+            journal = memory_journal(new_operation())
+            journal.log(IDENTITY).begin(marker())
+            begun.append(journal.verify().problems)
+            journal.close()
+
+    threads = [threading.Thread(target=begin) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert begun == [()] * 40

@@ -1,18 +1,15 @@
 """Sentences: one function for all, in the words of the program, its language and its local time."""
 
-import ast
 import os
 import pickle
 import re
 import time
-from functools import cache
 from pathlib import Path
 
 import pytest
 from robolink_cli.console.language import _of_user, chosen_language
 from robolink_cli.console.shell_words import SHELL_WAYS
 
-import robolink
 from robolink import messages
 from robolink.controllers import advise_emergency_stop
 from robolink.controllers.tool_table import require_replacement
@@ -25,65 +22,9 @@ from robolink.pose_tables.values import OpenQuestion, unclear
 from robolink.remedy_words import RemedyWord, remedy_word, speaking
 from robolink.timing import local_label
 
-# Every sentence goes through one function, in a form that can be collected and filled.
+# Every sentence goes through one function.
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
-CALLED = re.compile(r"\b(tr|declared)\s*\(")
-"""Every module with a sentence has this; parsing the others would show nothing."""
-
-
-def sources():
-    return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
-
-
-@cache
-def looked_at():
-    """Return each module's calls and the lines that run too early; parse trees are large."""
-    found = []
-    for path in sources():
-        source = path.read_text(encoding="utf-8")
-        if CALLED.search(source):
-            tree = ast.parse(source)
-            nodes = list(ast.walk(tree))
-            found.append((path, list(sentences(nodes)), list(too_early(tree, nodes))))
-    return found
-
-
-def sentences(nodes):
-    for node in nodes:
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "declared"):
-            yield node
-
-
-def when_imported(top):
-    """Yield the code that runs at import: the bodies of functions do not."""
-    waiting = [top]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            defaults = [one for one in node.args.kw_defaults if one is not None]
-            waiting += [*node.decorator_list, *node.args.defaults, *defaults]
-        elif not isinstance(node, ast.Lambda):
-            waiting += ast.iter_child_nodes(node)
-
-
-def too_early(tree, nodes):
-    """Yield the calls of ``tr`` at import, and those whose text click keeps."""
-    kept = (
-        node.value
-        for node in nodes
-        if isinstance(node, ast.keyword) and node.arg in ("help", "short_help", "epilog")
-    )
-    for node in (*when_imported(tree), *kept):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "tr":
-            yield node.lineno
-
-
-def placeholders(sentence):
-    """Return the names in braces; other text in braces is text."""
-    return set(re.findall(r"(?<!{){([a-z_]\w*)[^{}]*}", sentence))
 
 
 @pytest.fixture
@@ -105,70 +46,13 @@ def test_a_translation_is_asked_for_the_sentence_before_it_is_filled(shouted):
     assert tr("Connect again.") == "CONNECT AGAIN."
 
 
-def test_every_sentence_is_a_literal_that_gets_exactly_its_values():
-    wrong, seen = [], 0
-    for path, calls, _ in looked_at():
-        for call in calls:
-            seen += 1
-            place = f"{path.relative_to(ROOT)}:{call.lineno}"
-            (sentence,) = call.args
-            if not isinstance(sentence, ast.Constant):
-                wrong.append(f"{place}: not a literal, cannot be collected")
-                continue
-            given = {keyword.arg for keyword in call.keywords}
-            wanted = placeholders(str(sentence.value))
-            if None not in given and wanted != given:  # **values cannot be counted here
-                wrong.append(f"{place}: the sentence wants {wanted}, gets {given}")
-    assert not wrong
-    assert seen > 1000
-
-
-def test_nothing_is_translated_before_the_language_is_known():
-    wrong = [
-        f"{path.relative_to(ROOT)}:{line}: declared(...) here, spoken(...) where it is shown"
-        for path, _, lines in looked_at()
-        for line in lines
-    ]
-    assert not wrong
-
-
-def test_what_would_be_translated_too_early_is_found():
-    source = (
-        'A = tr("a")\nclass B:\n    c = {1: tr("c")}\n@option(help=tr("d"))\ndef f(x=tr("x")):\n'
-        '    g = option(help=tr("g"))\n    return tr("no")\n'
-    )
-    tree = ast.parse(source)
-    assert sorted(set(too_early(tree, ast.walk(tree)))) == [1, 3, 4, 5, 6]
-
-
 # A sentence of the library names the next step in the words of the program that shows it.
-
-LIBRARY = Path(robolink.__file__).parent
-OPTION = re.compile(r"(?<![\w-])--[a-z]")
-
-
-def own_sentences(calls):
-    """Yield a module's sentences for people, among its calls."""
-    for node in calls:
-        if node.func.id == "tr" and isinstance(node.args[0], ast.Constant):
-            yield node.args[0].value
 
 
 def test_the_shell_has_a_word_for_every_way():
     ways = [text for name, text in vars(RemedyWord).items() if name.isupper()]
     assert len(set(ways)) == len(ways) > 30
     assert set(SHELL_WAYS) == set(ways)
-
-
-def test_no_sentence_of_the_library_names_an_option_of_the_command_line():
-    found = [
-        (str(path.relative_to(LIBRARY)), text)
-        for path, calls, _ in looked_at()
-        if path.is_relative_to(LIBRARY)
-        for text in own_sentences(calls)
-        if OPTION.search(text)
-    ]
-    assert found == []
 
 
 def test_each_program_says_it_in_its_own_words():

@@ -307,7 +307,7 @@ def test_a_preview_names_everything_that_would_be_written(commit_bit, level):
 def test_registers_that_cannot_be_put_back_leave_the_outcome_unknown(commit_bit):
     with commit_bit.connect() as controller:
         commit_bit.client.refuse = {1, 2}
-        with pytest.raises(OutcomeUnknownError, match="could not restore the registers"):
+        with pytest.raises(OutcomeUnknownError, match="could not restore the values"):
             controller.tools.write(1, NEW, expected=ANY)
         assert len(controller.outcomes.open_markers()) == 1
 
@@ -539,7 +539,8 @@ def test_registers_that_are_not_on_record_are_told_before_a_change(commit_bit):
         commit_bit.client.write_registers(*_of(NEW))  # and the PLC is never asked to take them
         change_tools(controller, [Wanted(1, again, NEW)], tell=told.append)
     (doubt,) = told
-    assert "registers of tool 1 hold X 1.500" in doubt
+    assert "The PLC shows X 1.500" in doubt
+    assert "for tool 1; on record" in doubt
     assert "on record is X 1.600" in doubt
     assert "HMI" in doubt
 

@@ -281,7 +281,7 @@ def test_threads_that_use_it_first_at_one_time_use_one_machine():
 
 def test_what_it_has_not_is_named():
     with pytest.raises(AttributeError, match="machin"):
-        EpsonSimulator().machin  # noqa: B018 - it raises
+        EpsonSimulator().machin  # type: ignore[attr-defined]  # noqa: B018 - it raises
 
 
 def test_a_state_file_that_does_not_fit_is_refused_at_once(tmp_path):

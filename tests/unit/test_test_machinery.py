@@ -10,6 +10,7 @@ from pathlib import Path
 from textwrap import dedent
 
 import pytest
+from hypothesis.internal.conjecture import providers
 
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.model import Secret
@@ -103,6 +104,13 @@ def test_processes_that_share_the_tests_tell_how_each_ended(tmp_path, asked, cod
         check=False,
     )
     assert (done.returncode, told in done.stdout) == (code, True), done.stdout
+
+
+def test_only_soak_draws_the_constants_of_the_sources(pytestconfig):
+    if not hasattr(providers, "_get_local_constants"):
+        pytest.skip("this Hypothesis looks for no constants in the sources")
+    found = providers._get_local_constants().set_for_type("string")
+    assert bool(found) is ("soak" in pytestconfig.option.markexpr)
 
 
 # The search for passwords finds one wherever it is.

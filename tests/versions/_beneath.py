@@ -15,6 +15,7 @@ _OLDER: Final = "the releases beneath are older than Python 3.11"
 _RECENT: Final = "of what meets a network, only releases of the last two years are tried"
 
 REASONS: Final[Mapping[str, str]] = {
+    "asyncua": "its codec is no promised interface: each minor version is tried (decision 0012)",
     "canopen": _OLDER,
     "cryptography": _RECENT,
     "dbos": "its gaps were looked at in this release (docs/decisions/0072)",

@@ -17,7 +17,7 @@ NEVER: Final = ("dev", "browser", "docs")
 PYTHONS: Final = ("3.11", "3.12", "3.13", "3.14")
 """The versions of Python that ``make versions`` looks for, the lowest first."""
 
-_OF_A_PLANT: Final = ("paho-mqtt", "prometheus-client")
+_OF_A_PLANT: Final = ("asyncua", "paho-mqtt", "prometheus-client")
 
 UNTRIED: Final = {
     "newest-3.12": frozenset(_OF_A_PLANT),

@@ -45,6 +45,8 @@ CHOSEN: Final = (
     "tests/unit/test_config_files.py",
     "tests/unit/test_mailbox_link_can.py",
     "tests/unit/test_mailbox_link_modbus.py",
+    "tests/unit/test_opcua_client.py",
+    "tests/unit/test_opcua_security.py",
     "tests/unit/test_recipe_checks.py",
     "tests/unit/test_recipe_files.py",
     "tests/unit/test_report.py",

@@ -7,10 +7,7 @@ import pytest
 from robolink_cli.panel.guard import line_gate, people
 
 from robolink.fleet import FleetStore
-from tests.fleet.conftest import server
 from tests.panel.plant._served import LineComputer, PlantPanel, token_of
-
-__all__ = ["server"]
 
 CELLS = ("line3-a", "line3-b", "line4-a")
 

@@ -3,6 +3,8 @@
 import asyncio
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +14,7 @@ from robolink_cli.panel.stop import StopAnswer, StopAsked, StopDesk, StopEnd, St
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.stopping import StopListener, find_note
@@ -291,3 +294,29 @@ def test_a_stop_does_not_wait_for_the_threads_of_the_loop(robot, own):
         return answer
 
     assert asyncio.run(work()).outcome is StopEnd.STOPPED
+
+
+LOADED = """
+import sys
+from robolink_cli.panel.stop import load_opcua
+load_opcua()
+before = set(sys.modules)
+from robolink.controllers import stop_now
+stop_now(sys.argv[1])
+ours = ("asyncua", "cryptography", "robolink.transport.opcua")
+print(*sorted(name for name in set(sys.modules) - before if name.startswith(ours)))
+"""
+
+
+def test_what_a_stop_over_opc_ua_takes_was_loaded_before_it():
+    from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
+
+    with serve_opcua(SoftMotionSimulator(seed=1)) as host:
+        done = subprocess.run(
+            [sys.executable, "-c", LOADED, host.url],
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=30,
+        )
+    assert done.stdout == "\n"

@@ -149,6 +149,30 @@ CANOPEN SET_THEN_UNDO points: * 114, commit 16, commit after 8, wire sent 5, pro
 CANOPEN MOVE_AND_LEAVE requests: * 37, MOVE_LINEAR 1, OWNERSHIP 2, read_response 16, snapshot 16
 CANOPEN MOVE_AND_LEAVE points: * 72, commit 8, commit after 4, wire sent 4, procedure 3,
     question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
+OPCUA CHANGE_NOZZLE requests: * 487, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20, MOVE_DIRECT 3,
+    OWNERSHIP 2, read_slot 8, read_response 190, beat 258
+OPCUA CHANGE_NOZZLE points: * 948, commit 148, commit after 74, wire sent 30, procedure 33,
+    question 18, step 16, WRITE_TOOL 6, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15, lock
+    2103 20, lock 5205 1
+OPCUA SET_TOOL requests: * 25, WRITE_TOOL 1, OWNERSHIP 2, read_slot 6, read_response 13, beat 3
+OPCUA SET_TOOL points: * 48, commit 4, commit after 2, wire sent 3, procedure 3, question 1,
+    WRITE_TOOL 6, lock 5205 1
+OPCUA SET_TWO requests: * 40, WRITE_TOOL 2, OWNERSHIP 2, read_slot 11, read_response 21, beat 4
+OPCUA SET_TWO points: * 83, commit 12, commit after 6, wire sent 4, procedure 5, question 1,
+    WRITE_TOOL 12, lock 5205 2
+OPCUA SELECT_TOOL requests: * 8, read_slot 2, read_response 6
+OPCUA SELECT_TOOL points: * 12, procedure 1, question 1, SELECT_TOOL 1
+OPCUA UNDO requests: * 45, WRITE_TOOL 1, OWNERSHIP 2, read_slot 12, read_response 25, beat 4
+OPCUA UNDO points: * 100, commit 18, commit after 9, wire sent 4, procedure 7, question 1,
+    WRITE_TOOL 6, lock 5205 1
+OPCUA SET_THEN_UNDO requests: * 47, WRITE_TOOL 3, OWNERSHIP 2, read_slot 12, read_response 25,
+    beat 5
+OPCUA SET_THEN_UNDO points: * 107, commit 16, commit after 8, wire sent 5, procedure 10,
+    question 3, WRITE_TOOL 18, lock 5205 3
+OPCUA MOVE_AND_LEAVE requests: * 30, MOVE_LINEAR 1, OWNERSHIP 2, read_slot 2, read_response 20,
+    beat 4
+OPCUA MOVE_AND_LEAVE points: * 66, commit 8, commit after 4, wire sent 4, procedure 3, question
+    1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
 REGISTER_MAP SET_TOOL requests: * 31, fc16 1, fc5 2, fc3 14
 REGISTER_MAP SET_TOOL points: * 36, commit 4, commit after 2, wire sent 3, procedure 3, question
     1, fc16 1, fc5 2

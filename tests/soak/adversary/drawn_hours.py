@@ -23,7 +23,13 @@ from tests.soak.adversary.instants import drawn_instant, drawn_rarity
 from tests.soak.adversary.plant.lines import LineBend
 
 MAILBOX_KINDS: Final = frozenset(
-    {CellKind.SOFTMOTION, CellKind.MODBUS_TCP, CellKind.MODBUS_RTU, CellKind.CANOPEN}
+    {
+        CellKind.SOFTMOTION,
+        CellKind.MODBUS_TCP,
+        CellKind.MODBUS_RTU,
+        CellKind.CANOPEN,
+        CellKind.OPCUA,
+    }
 )
 LINE_KINDS: Final = frozenset({CellKind.EPSON_SERIAL, CellKind.MODBUS_RTU, CellKind.REGISTER_MAP})
 """Cells with a serial line, whose bytes may be lost, swapped, changed or added to."""
@@ -35,6 +41,7 @@ _LINKS: Final = {
     CellKind.MODBUS_TCP: LinkKind.MODBUS_TCP,
     CellKind.MODBUS_RTU: LinkKind.MODBUS_RTU,
     CellKind.CANOPEN: LinkKind.CAN,
+    CellKind.OPCUA: LinkKind.OPCUA,
     CellKind.REGISTER_MAP: LinkKind.PLC_RTU,
 }
 _OF_EPSON: Final = (
@@ -122,7 +129,10 @@ _TURNS: Final = (
     CellKind.EPSON,
     CellKind.MODBUS_TCP,
 )
-"""The kinds of cells of seeds 0, 1, 2 .. 19, and so on."""
+"""The kinds of cells of seeds 0, 1, 2 .. 19, and so on.
+
+``CellKind.OPCUA`` came later and is asked for by name, so that each seed keeps its history.
+"""
 
 _ANOTHER_SHARE: Final = 0.6
 _MOST: Final = 4

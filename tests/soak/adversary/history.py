@@ -23,6 +23,7 @@ class CellKind(StrEnum):
     MODBUS_TCP = "softmotion over modbus tcp"
     MODBUS_RTU = "softmotion over modbus rtu"
     CANOPEN = "softmotion over canopen"
+    OPCUA = "softmotion over opc ua"
     REGISTER_MAP = "plc with a register map"
     PROGRAM = "epson program that calls back"
 

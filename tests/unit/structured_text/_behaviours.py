@@ -18,7 +18,7 @@ from robolink_simulators.softmotion import GroupOptions, SmcNumbers
 from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.plc import Plc
 from robolink_simulators.softmotion.program.structured_plc import PROGRAM_SOURCES, StructuredPlc
-from robolink_simulators.structured_text import SourceText
+from robolink_simulators.structured_text import SourceText, TextDialect
 
 from robolink.controllers import connect
 from robolink.errors import RobolinkError
@@ -49,18 +49,22 @@ ABOUT_X = 0b1000
 READ_MODES = ("CURRENT", "ACTIVE", "LAST")
 
 
-def sources(kinematics="", profile=ExportProfile.FULL, change=lambda text: text):
+def sources(kinematics="", profile=ExportProfile.FULL, change=lambda text: text, opcua=False):
     """Return the exported texts, altered by ``change``."""
-    texts = program_texts(profile, kinematics=kinematics, read_modes=READ_MODES)
-    return [SourceText(name, change(texts[name]), kind) for name, kind in PROGRAM_SOURCES]
+    texts = program_texts(profile, kinematics=kinematics, read_modes=READ_MODES, opcua=opcua)
+    kinds = dict(PROGRAM_SOURCES)
+    return [
+        SourceText(name, change(text), kinds.get(name, TextDialect.CODESYS))
+        for name, text in texts.items()
+    ]
 
 
-def of_program(texts=None):
+def of_program(texts=None, *, opcua=False):
     """Return a maker of PLCs that execute the exported program."""
 
     def make(model, parameters, options):
         name = model.kinematics.name
-        given = texts or sources(name, ExportProfile(options.mailbox.profile))
+        given = texts or sources(name, ExportProfile(options.mailbox.profile), opcua=opcua)
         return StructuredPlc(model, parameters, options, given)
 
     return make

@@ -13,6 +13,7 @@ from tests.soak.adversary.plant.softmotion import (
     CanopenPlant,
     ModbusRtuPlant,
     ModbusTcpPlant,
+    OpcuaPlant,
     SoftMotionPlant,
 )
 
@@ -23,6 +24,7 @@ PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachi
     CellKind.MODBUS_TCP: ModbusTcpPlant,
     CellKind.MODBUS_RTU: ModbusRtuPlant,
     CellKind.CANOPEN: CanopenPlant,
+    CellKind.OPCUA: OpcuaPlant,
     CellKind.REGISTER_MAP: RegisterMapPlant,
 }
 """The machines by kind. One whose own program calls back must know the turns, and is elsewhere."""

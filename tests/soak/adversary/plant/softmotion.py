@@ -1,4 +1,4 @@
-"""A SoftMotion PLC in a virtual cell, and the links to its mailbox: blocks, Modbus, CANopen."""
+"""A SoftMotion PLC in a virtual cell and its links: blocks, Modbus, CANopen, OPC UA."""
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
@@ -104,6 +104,9 @@ class MailboxProduction:
 
 
 _TIMEOUT_S: Final = 3.0
+_TURN_S: Final = 0.008
+"""The OPC UA server's time for an answer: two cycles of its PLC."""
+
 _WATCHDOGS_MS: Final = (0, 2000, 0, 500)
 """Watchdogs of the fieldbus, by seed: silence after which it zeroes what clients write; 0 never."""
 
@@ -463,3 +466,32 @@ class ModbusRtuPlant(ModbusTcpPlant):
     def bent(self) -> bool:
         """See ``PlantMachine.bent``; the line may have altered something, too."""
         return super().bent or bool(self._line.acts.met)
+
+
+class OpcuaPlant(SoftMotionPlant):
+    """A PLC with its mailbox behind an OPC UA server, built like :class:`SoftMotionPlant`."""
+
+    address = "softmotion+opcua://cell"
+
+    def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
+        from tests._stepped_opcua import SteppedOpcua  # a second, which other cells do not need
+
+        super().__init__(clock, tap, seed)
+        self.simulator.answer_s = _TURN_S
+        self._server = SteppedOpcua(self.simulator, clock)
+        self._open: dict[int, MailboxLink] = {}
+
+    def link(self) -> MailboxLink:
+        """Open a session of its own."""
+        return self._server.mailbox(self.address, _TIMEOUT_S)
+
+    def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
+        """See :meth:`SoftMotionPlant.tapped`."""
+        self._open[process.number] = link
+        return super().tapped(link, process)
+
+    def hang_up(self, process: VirtualProcess) -> None:
+        """Close the connection of a process that died, as the system does."""
+        link = self._open.pop(process.number, None)
+        if link is not None:
+            link.close()

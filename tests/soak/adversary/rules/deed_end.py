@@ -219,8 +219,8 @@ class EndRules:
 _PROOFS: Final = ("verified", "tested, and kept by the program")
 """The record's words for a tested value: by robolink, and by a program's touches."""
 
-_DOUBT: Final = re.compile(r"The registers of tool (\d+) hold ")
-"""The beginning of one of robolink's sentences (docs/plc-maps.md)."""
+_DOUBT: Final = re.compile(r"for tool (\d+); on record is ")
+"""Part of one of robolink's sentences (docs/plc-maps.md)."""
 
 
 class RestRules:

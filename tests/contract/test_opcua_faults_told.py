@@ -1,0 +1,157 @@
+"""What our driver says of each fault of an OPC UA server: by its name, and never a wrong value."""
+
+from contextlib import closing
+
+import pytest
+from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
+from robolink_simulators.plc import PlcSimulator, serve_plc_opcua
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
+from robolink_simulators.testkit.operator import written_symbol_map
+
+import robolink
+from robolink.errors import (
+    OutcomeUnknownError,
+    ReadBackError,
+    RejectedError,
+    RemoteProtocolError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
+from robolink.register_maps import load_symbol_map
+from robolink.testing import confirm_whole_map
+from robolink.transport import open_opcua
+
+pytestmark = pytest.mark.simulator_only
+
+PATIENCE_S = 0.5
+PARENT = "/DeviceSet/*/Resources/Application/GlobalVars/GVL_Tools"
+TOOL = robolink.ToolOffset(1, 2, 3)
+
+READS = (
+    ("wrong_type", RemoteProtocolError, "has to be"),
+    ("short_array", RemoteProtocolError, "has to be"),
+    ("out_of_service", RejectedError, "BadOutOfService"),
+    ("lose_session", TransportBrokenError, "BadSessionIdInvalid"),
+    ("drop_channel", TransportBrokenError, "BadSecureChannelClosed"),
+    ("disconnect", TransportBrokenError, "closed the connection"),
+    ("reset", TransportBrokenError, "broke"),
+    ("half_open", TransportTimeoutError, "did not answer"),
+    ("drop_reply", TransportTimeoutError, "did not answer"),
+)
+WRITES = (
+    ("read_only", RejectedError, "BadNotWritable", False),
+    ("wrong_type", RejectedError, "BadTypeMismatch", False),
+    ("out_of_service", OutcomeUnknownError, "does not say whether this was done", False),
+    ("lose_session", OutcomeUnknownError, "BadSessionIdInvalid", False),
+    ("drop_channel", OutcomeUnknownError, "BadSecureChannelClosed", True),
+    ("drop_reply", OutcomeUnknownError, "did not answer", True),
+    ("ignore_write", ReadBackError, "reads back as", False),
+)
+"""Fault of a write to a PLC, what the driver raises and says, and whether it arrived."""
+
+
+def test_each_fault_of_a_read_is_told_by_its_name(robolink_state):
+    plc = SoftMotionSimulator(seed=3)
+    with served(plc, "opcua") as url:
+        right = robolink.connect(url)
+        due = right.tools.read(1)
+        right.close()
+        for action, kind, words in READS:
+            with robolink.connect(url, timeout_s=PATIENCE_S) as controller:
+                plc.faults.add(PlcFault(PlcFaultAction[action.upper()], match="read_slots"))
+                with pytest.raises(kind) as told:
+                    controller.tools.read(1)
+            assert words in str(told.value), action
+            assert plc.faults.fired[-1].action.name.lower() == action
+        with robolink.connect(url) as controller:
+            assert controller.tools.read(1) == due
+    assert plc.counters()["tool_writes"] == 0
+
+
+def test_a_value_out_of_service_while_connecting_is_told_by_its_name_and_not_kept(
+    robolink_state, tmp_path
+):
+    mailbox = SoftMotionSimulator(seed=3)
+    with served(mailbox, "opcua") as url:
+        mailbox.faults.add(PlcFault(PlcFaultAction.OUT_OF_SERVICE, every=1))
+        with pytest.raises(RejectedError, match="BadOutOfService"):
+            robolink.connect(url)
+    path = written_symbol_map(tmp_path)
+    plc = PlcSimulator(load_symbol_map(path), seed=7)
+    tool = "ns=4;s=|var|PLC.Application.GVL_Tools.aNeedleA"
+    with serve_plc_opcua(plc, path) as host:
+        plc.faults.add(Fault(FaultAction.OUT_OF_SERVICE, match="aNeedleA", every=1))
+        with pytest.raises(RejectedError, match="BadOutOfService"):
+            robolink.connect(host.url)
+        with closing(open_opcua(host.url.partition("?")[0] + "?security=none")) as client:
+            with pytest.raises(RejectedError, match="BadOutOfService"):
+                client.describe(tool)
+            (found,) = {one for one in client.browse(PARENT) if one.id == tool}
+            assert not found.readable
+            plc.faults.forget()
+            assert client.describe(tool).type_name == "Double[6]"
+
+
+def test_a_torn_block_is_read_again_and_one_that_stays_torn_is_told(robolink_state):
+    plc = SoftMotionSimulator(seed=3)
+    torn = PlcFaultAction.TEAR_ARRAY
+
+    def asked():
+        return sum(line[1:] == (">", "read_response") for line in plc.log)
+
+    with served(plc, "opcua") as url, robolink.connect(url) as controller:
+        due = controller.status()
+        for number, cut in enumerate((1, 50, 113), 1):
+            plc.faults.add(PlcFault(torn, match="read_response", position=cut))
+            assert controller.status() == due
+            assert [fault.action for fault in plc.faults.fired] == [torn] * number
+        plc.faults.add(PlcFault(torn, match="read_response", position=50, every=1))
+        before = asked()
+        with pytest.raises(RemoteProtocolError, match="mixed two PLC cycles in each of 3 answers"):
+            controller.status()
+        assert asked() == before + 3
+
+
+@pytest.mark.parametrize(("action", "kind", "words", "arrived"), WRITES, ids=lambda value: value)
+def test_each_fault_of_a_write_is_told_and_nothing_is_sent_twice(
+    robolink_state, tmp_path, action, kind, words, arrived
+):
+    path = written_symbol_map(tmp_path)
+    plc = PlcSimulator(load_symbol_map(path), seed=7)
+    with serve_plc_opcua(plc, path) as host:
+        with robolink.connect(host.url, timeout_s=PATIENCE_S) as controller:
+            confirm_whole_map(controller)
+            old = controller.tools.read(1)
+            plc.faults.add(Fault(FaultAction[action.upper()], match="write GVL_Tools.aNeedleA"))
+            with pytest.raises(kind) as told:
+                controller.tools.write(1, TOOL, expected=old)
+        assert words in str(told.value)
+        sent = [text for _, way, text in plc.log if way == ">" and text.endswith("aNeedleA")]
+        assert sum(text.startswith("write") for text in sent) == 1
+        assert (plc.program.shown()[1]["x"] == TOOL.x_mm) is arrived
+        assert plc.program.takeovers == (action == "ignore_write")
+
+
+def test_an_array_that_changes_while_it_is_read_is_never_taken_for_a_tool(robolink_state, tmp_path):
+    """The program changes the array in each answer: no two readings are equal, none is believed."""
+    path = written_symbol_map(tmp_path)
+    plc = PlcSimulator(load_symbol_map(path), seed=7)
+    with serve_plc_opcua(plc, path) as host, robolink.connect(host.url) as controller:
+        due = controller.tools.read(1)
+        held = dict(plc.program.in_force[1])
+        count = 0
+
+        def change(_number, text):
+            nonlocal count
+            if "aNeedleA" in text:
+                count += 1
+                plc.program.set_tool(1, {name: value + count for name, value in held.items()})
+
+        plc.on_reply = change
+        plc.faults.add(Fault(FaultAction.TEAR_ARRAY, match="aNeedleA", position=1, every=1))
+        with pytest.raises(RemoteProtocolError, match="changes at every reading"):
+            controller.tools.read(1)
+        plc.on_reply = None
+        plc.program.set_tool(1, held)
+        assert controller.tools.read(1) == due

@@ -1,9 +1,11 @@
 """What our driver says of each fault of an OPC UA server: by its name, and never a wrong value."""
 
+import re
 from contextlib import closing
 
 import pytest
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
+from robolink_simulators.faults.links import LinkKind, links_of
 from robolink_simulators.plc import PlcSimulator, serve_plc_opcua
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.testkit.media import served
@@ -15,6 +17,7 @@ from robolink.errors import (
     ReadBackError,
     RejectedError,
     RemoteProtocolError,
+    RobolinkError,
     TransportBrokenError,
     TransportTimeoutError,
 )
@@ -49,6 +52,58 @@ WRITES = (
     ("ignore_write", ReadBackError, "reads back as", False),
 )
 """Fault of a write to a PLC, what the driver raises and says, and whether it arrived."""
+
+
+TOLD_ON_OTHER_LINKS_TOO = (
+    ("drop_request", TransportTimeoutError, "did not answer"),
+    ("truncate_reply", TransportTimeoutError, "did not answer"),
+    ("duplicate_reply", RemoteProtocolError, "makes no sense"),
+    ("zero_reply", RemoteProtocolError, "it is empty"),
+    ("disconnect_before", TransportBrokenError, "closed the connection"),
+    ("restart", TransportBrokenError, "has restarted"),
+    ("word_order", RemoteProtocolError, "high word first"),
+)
+"""The same of faults that every link of a mailbox has; a restart and words in another order show
+at the next answer."""
+BORNE = frozenset(
+    {
+        *("duplicate_request", "stall", "delay", "reorder_write"),
+        *("garble_reply", "tear_reply", "stale_reply", "split_reply", "tear_array", "tear_nodes"),
+        *("garble_write", "tear_write", "ignore_write", "read_only", "expired_certificate"),
+        *("freeze", "freeze_heartbeat", "zero_inputs", "take_ownership", "withdraw_permit"),
+        *("estop", "axis_error"),
+    }
+)
+"""Faults of which a read is right all the same: it is read again, it waits, or they are of writes,
+of movements and of later connections."""
+
+
+@pytest.mark.soak
+def test_each_fault_that_a_plan_may_have_is_told_by_a_read_or_does_it_no_harm(robolink_state):
+    told_by = {action: (kind, words) for action, kind, words in (*READS, *TOLD_ON_OTHER_LINKS_TOO)}
+    possible = [one for one in PlcFaultAction if LinkKind.OPCUA in links_of(one)]
+    assert {one.name.lower() for one in possible} == told_by.keys() | BORNE
+    for action in possible:
+        plc = SoftMotionSimulator(seed=3)
+        with served(plc, "opcua") as url, robolink.connect(url, timeout_s=PATIENCE_S) as controller:
+            due = controller.tools.read(1)
+            plc.faults.add(PlcFault(action, match="read_slots"))
+            if (told := told_by.get(action.name.lower())) is None:
+                assert controller.tools.read(1) == due, action
+                continue
+            with pytest.raises(told[0], match=re.escape(told[1])):
+                controller.tools.read(1)
+
+
+def test_a_certificate_that_ends_is_told_at_the_next_connection(robolink_state):
+    plc = SoftMotionSimulator(seed=3)
+    with served(plc, "opcua-secured") as url:
+        plc.faults.add(PlcFault(PlcFaultAction.EXPIRED_CERTIFICATE, match="read_slots"))
+        with robolink.connect(url) as controller:
+            due = controller.tools.read(1)
+            assert controller.tools.read(1) == due
+        with pytest.raises(RobolinkError, match="certificate"):
+            robolink.connect(url)
 
 
 def test_each_fault_of_a_read_is_told_by_its_name(robolink_state):

@@ -63,8 +63,9 @@ def test_a_page_is_shown_as_a_terminal_holds_it(shown):
 
 
 # No escape sequences: click's own wrapping never ends where a word is cut inside one. Nor does it
-# end where a paragraph is indented by more than its column is wide, so no indent is a long one.
-DEEP = re.compile(r"^[ \t]{3,}", re.MULTILINE)
+# end where a paragraph is indented by more than its column is wide, so no indent is a long one:
+# two tabs are sixteen blanks already.
+DEEP = re.compile(r"^(?:[ \t]*\t[ \t]*|[ \t]{3,})", re.MULTILINE)
 WORDS = st.lists(st.text("ab-.\t\n é", max_size=9), max_size=6).map(
     lambda words: DEEP.sub("  ", " ".join(words))
 )

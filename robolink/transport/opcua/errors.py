@@ -147,6 +147,10 @@ def refused_service(
             "Let the PLC trust this computer's certificate, then try again. To show it: "
             "robolink cell certificate"
         )
+    return _refused(identity, request, status, remedy)
+
+
+def _refused(identity: str, request: str, status: ReportedStatus, remedy: str) -> RejectedError:
     return RejectedError(
         tr(
             "{identity} refused: {request}. {name}: {meaning}",
@@ -186,18 +190,7 @@ def refused_node(
     remedy = tr("Check in the PLC that this variable is among its symbols, and what may use it.")
     if status.name in ("BadNodeIdUnknown", "BadNodeIdInvalid"):
         remedy = tr("Compare the name with those that the server has: its program may be another.")
-    return RejectedError(
-        tr(
-            "{identity} refused: {request}. {name}: {meaning}",
-            identity=identity,
-            request=request,
-            name=status.name,
-            meaning=status.meaning,
-        ),
-        code=status.code,
-        remedy=remedy,
-        request=request,
-    )
+    return _refused(identity, request, status, remedy)
 
 
 def changed_type(identity: str, node: str, due: str, found: str) -> RemoteProtocolError:

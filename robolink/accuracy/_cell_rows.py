@@ -110,7 +110,8 @@ def facts_at(
         >>> facts.of("place_mm").basis
         'default'
     """
-    pooled = None if alike is None else pooled_look(record.calibrations, alike)
+    # Without a station none of them counts, and a long record takes long to read.
+    pooled = pooled_look(record.calibrations, alike) if alike and alike.station else None
     sigma_mm = None
     if pooled is not None:
         # The look is the mean of its inputs in each coordinate.

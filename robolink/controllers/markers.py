@@ -34,7 +34,12 @@ from robolink.timing import local_label, wall_label
 
 _LOG: Final = PackageLog(__package__)
 
-_PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
+# Every command asks for them, and before Python 3.12 a member of an Enum is found slowly.
+_SET, _MOVE = MarkerKind.SET, MarkerKind.MOVE
+_SELECTION, _CHANGE = MarkerKind.SELECTION, MarkerKind.CHANGE
+_PROCEDURE: Final = Checkpoint.PROCEDURE
+
+_PROCEDURES: Final = frozenset({_SELECTION, _CHANGE})
 _OF_A_TOOL: Final = frozenset({"tool", "select"})
 """Details of markers for writing, clearing or selecting a tool."""
 
@@ -107,7 +112,7 @@ class ProcedureLock:
 
     @contextmanager
     def _locked(self, request: str, *, calming: bool = False) -> Iterator[None]:
-        checkpoint(Checkpoint.PROCEDURE, request)
+        checkpoint(_PROCEDURE, request)
         self._enter(request, calming=calming)
         try:
             yield
@@ -266,7 +271,7 @@ class MarkerStore:
     @property
     def moving(self) -> bool:
         """Whether a movement was started here whose end is not confirmed."""
-        return MarkerKind.MOVE in self._under_way.values()
+        return _MOVE in self._under_way.values()
 
     def begin(
         self,
@@ -298,13 +303,13 @@ class MarkerStore:
         """
         if not operation and not self._latch.restores:
             self._latch.require_open(request)
-            if kind is MarkerKind.SET and not _OF_A_TOOL.isdisjoint(details):
+            if kind is _SET and not _OF_A_TOOL.isdisjoint(details):
                 self._refuse_while_moving(request)
             if self._unsettled(self._under_way):
                 self._refuse_unsettled(request, besides=self._under_way)
                 raise self._overtaken(request)
         name = operation or new_operation()
-        writes = kind in (MarkerKind.SET, MarkerKind.CHANGE)
+        writes = kind in (_SET, _CHANGE)
         said = {"simulated": True} if writes and self._simulated() else {}
         marker = Marker(name, kind, request, wall_label(), {**details, **said})
         if not self._recorded(lambda: self.outcomes.begin(marker)):
@@ -367,7 +372,7 @@ class MarkerStore:
     @property
     def changing(self) -> bool:
         """Whether a tool change of several steps is in progress here."""
-        marker = self._procedures.get(MarkerKind.CHANGE)
+        marker = self._procedures.get(_CHANGE)
         # A marker that could not be undone stays open after its change has ended.
         return marker is not None and marker.details.get("change") == self.outcomes.change
 
@@ -377,10 +382,10 @@ class MarkerStore:
         Called when the controller has accepted the selection: until then the open marker of
         the selection itself says which other tool it may be.
         """
-        marker = self._procedures.get(MarkerKind.SELECTION)
+        marker = self._procedures.get(_SELECTION)
         if marker is not None and marker.details.get("now") != tool:
             noted = replace(marker, details={**marker.details, "now": tool})
-            self._procedures[MarkerKind.SELECTION] = noted
+            self._procedures[_SELECTION] = noted
             self._recorded(lambda: self.outcomes.begin(noted))
 
     def require_settled(self, request: str) -> None:
@@ -456,7 +461,7 @@ class MarkerStore:
             *(
                 marker.operation
                 for kind, marker in self._procedures.items()
-                if kind is not MarkerKind.CHANGE or self.changing
+                if kind is not _CHANGE or self.changing
             ),
         }
         return [m for m in self.outcomes.open_markers() if m.operation not in own]

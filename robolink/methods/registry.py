@@ -46,6 +46,13 @@ def _brought(_path: tuple[str, ...]) -> metadata.EntryPoints:
     return metadata.entry_points(group=METHODS_GROUP)
 
 
+@cache
+def _own(name: str) -> AnyMethod:
+    """Return one of ours; a change asks for its method many times."""
+    own: AnyMethod = import_module(_OWN[name]).METHOD
+    return own
+
+
 def method_names() -> tuple[str, ...]:
     """Return the names of all methods, in the order of the help page."""
     return tuple(dict.fromkeys((*_OWN, *sorted(_brought(tuple(sys.path)).names), *_registered)))
@@ -60,8 +67,7 @@ def find_method(name: str) -> AnyMethod:
     if name in _registered:
         return _registered[name]
     if name in _OWN:
-        own: AnyMethod = import_module(_OWN[name]).METHOD
-        return own
+        return _own(name)
     try:
         found = find_plug_in(METHODS_GROUP, name)
     except PlugInError as error:

@@ -19,6 +19,8 @@ from robolink.model._tools import ToolOffset, describe_offset, read_offset
 
 Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
 
+_SET, _MOVE = MarkerKind.SET, MarkerKind.MOVE  # before Python 3.12 a member is found slowly
+
 
 @dataclass(slots=True)
 class Account:
@@ -47,11 +49,11 @@ class _Deed:
     @property
     def tool(self) -> int | None:
         tool = self.marker.details.get("tool")
-        return tool if isinstance(tool, int) and self.marker.kind is MarkerKind.SET else None
+        return tool if isinstance(tool, int) and self.marker.kind is _SET else None
 
     @property
     def selects(self) -> bool:
-        return "select" in self.marker.details and self.marker.kind is MarkerKind.SET
+        return "select" in self.marker.details and self.marker.kind is _SET
 
     @property
     def before(self) -> ToolOffset | None:
@@ -88,13 +90,13 @@ class Ledger:
         """Note a command or a procedure that is about to start; its marker is durable."""
         with self._lock:
             self._open[marker.operation] = marker
-            if marker.kind not in (MarkerKind.SET, MarkerKind.MOVE):
+            if marker.kind not in (_SET, _MOVE):
                 return
             deed = self._doubts[marker.operation] = _Deed(marker)
             if deed.tool is not None:
                 self._requested[deed.tool] = deed.requested
             for account in self._accounts:
-                if marker.kind is MarkerKind.MOVE:
+                if marker.kind is _MOVE:
                     account.moved = True
                 elif deed.tool is not None:
                     account.before.setdefault(deed.tool, deed.before)
@@ -220,7 +222,7 @@ class Ledger:
         with self._lock:
             since = self._whole if account is None else account
             doubts = self._doubts.values()
-            moves = [deed for deed in doubts if deed.marker.kind is MarkerKind.MOVE]
+            moves = [deed for deed in doubts if deed.marker.kind is _MOVE]
             unproved = {m.kind for m in self._open.values()} - {MarkerKind.SELECTION}
             stands = any(map(self._stands, self._unkept))
             others = [d for d in doubts if d not in moves and d.tool is None and not d.selects]

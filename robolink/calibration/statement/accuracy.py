@@ -120,9 +120,8 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
     elif _too_sure_of_its_aim(result, facts, len(lengths)):
         scattered, basis = _scattering(result, _PERSON_MM, len(lengths)), "default"
     parts = list(_parts(sources, facts))
-    whole = with_station(scattered, *(one.part for one in parts))
-    held = _Held.of(scattered, parts)
-    known = _Held.of(scattered, [one for one in parts if one.basis != "default"])
+    whole = _with(scattered, parts)
+    held = _Held.of(scattered, whole, parts)
     worst = max(lengths, key=whole.half_width95.__getitem__)
     scatter = math.sqrt(max(float(scatter_covariance(scattered)[worst, worst]), 0.0))
     rows = [
@@ -145,7 +144,7 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
             half_width95=held.half_width95,
             rows=tuple(rows),
             budget=whole.budget or _plain_budget(rows),
-            without_defaults_mm=known.within_mm if basis != "default" else 0.0,
+            without_defaults_mm=0.0 if basis == "default" else _known_mm(scattered, parts),
         ),
     )
 
@@ -197,14 +196,15 @@ class _Held:
     half_width95: tuple[float, ...]
 
     @classmethod
-    def of(cls, scattered: CalibrationResult, parts: Sequence[_Part]) -> Self:
-        """Return it for some rows beside what scatters.
+    def of(
+        cls, scattered: CalibrationResult, whole: CalibrationResult, parts: Sequence[_Part]
+    ) -> Self:
+        """Return it for some rows beside what scatters; ``whole`` is the result with both.
 
         It is never less than of the scatter alone: a row that is known well lets the effective
         degrees of freedom grow, and with them the factor shrinks, at a few residuals by more than
         the row adds. And it holds an error that lies for good at the end of a row of one number.
         """
-        whole = with_station(scattered, *(one.part for one in parts))
         found = [cls._by_covariance(scattered), cls._by_covariance(whole)]
         found += [
             cls._at_the_end(whole, one)
@@ -263,6 +263,16 @@ class _Held:
             (float(along[0]), float(along[1])), (float(wide), float(narrow)), least=held.within_mm
         )
         return cls(within_mm, alone)
+
+
+def _known_mm(scattered: CalibrationResult, parts: Sequence[_Part]) -> float:
+    """Return what holds the truth in 95 % by the rows that somebody stated or measured."""
+    known = [one for one in parts if one.basis != "default"]
+    return _Held.of(scattered, _with(scattered, known), known).within_mm
+
+
+def _with(scattered: ResultT, parts: Sequence[_Part]) -> ResultT:
+    return with_station(scattered, *(one.part for one in parts))
 
 
 def _parts(sources: Sequence[ErrorSource], facts: AccuracyFacts) -> Iterator[_Part]:

@@ -27,6 +27,7 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Self
 
 from robolink.calibration.core.accuracy import AccuracyFacts, ErrorSource
@@ -79,7 +80,8 @@ class TurnView:
         return math.sqrt(max(self.limit_mm**2 - aside, 0.0))
 
 
-def shows_from_mm(views: Sequence[TurnView], coordinates: int, nu: float | None) -> float:
+@lru_cache(maxsize=64)  # tests of a tool mostly have the same limits, and an integral takes long
+def shows_from_mm(views: tuple[TurnView, ...], coordinates: int, nu: float | None) -> float:
     """Return the smallest shift of the tip that a test shows in 95 %.
 
     Args:
@@ -93,20 +95,17 @@ def shows_from_mm(views: Sequence[TurnView], coordinates: int, nu: float | None)
         >>> round(shows_from_mm((one,), 2, None), 4), round(shows_from_mm((one, one), 2, None), 4)
         (0.0739, 0.0662)
     """
-    known, beyond = normal_quantile(SHOWN_IN), student_t(SHOWN_IN, nu) if nu else None
+    known = normal_quantile(SHOWN_IN)
     limits = [(one, one.limit_along_mm(coordinates)) for one in views]
     nearest = min(limit for _, limit in limits)
     found = min(limit + known * math.hypot(one.own_mm, one.shared_mm) for one, limit in limits)
-    if len(limits) > 1:
-        least = 0.0
-        for _ in range(_HALVINGS):
-            middle = (least + found) / 2
-            if _missed(middle, limits) > 1 - SHOWN_IN:
-                least = middle
-            else:
-                found = middle
+    least = 0.0
+    for _ in range(_HALVINGS if len(limits) > 1 else 0):
+        middle = (least + found) / 2
+        shown = _missed(middle, limits) <= 1 - SHOWN_IN
+        least, found = (least, middle) if shown else (middle, found)
     # The true scatter may be larger than the estimated one.
-    wider = 1.0 if beyond is None else beyond / known
+    wider = student_t(SHOWN_IN, nu) / known if nu else 1.0
     return max(found, nearest + wider * (found - nearest))
 
 
@@ -414,7 +413,7 @@ def _shows_from_mm(claim: TurnClaim, proof: VerifyResult, limits: Sequence[Drift
         scatter = limit.repeatable_mm**2 / quantile
         own = min(claim.look_sigma_mm**2 / drift.looks, scatter)
         views.append(TurnView(max(allowed_mm, 0.0), math.sqrt(own), math.sqrt(scatter - own)))
-    return shows_from_mm(views, coordinates, claim.look_nu)
+    return shows_from_mm(tuple(views), coordinates, claim.look_nu)
 
 
 def _shows_z_from_mm(claim: TurnClaim, proof: VerifyResult, shows_mm: float | None) -> float | None:
@@ -422,8 +421,8 @@ def _shows_z_from_mm(claim: TurnClaim, proof: VerifyResult, shows_mm: float | No
     if not claim.measures_z or shows_mm is None:
         return None
     by_drifts = shows_mm if proof.coordinates != _PLANE else None
-    told = [one for one in (by_drifts, proof.height_shows_from_mm) if one is not None]
-    return min(told, default=None)
+    told = (by_drifts, proof.height_shows_from_mm)
+    return min((one for one in told if one is not None), default=None)
 
 
 def _limits(

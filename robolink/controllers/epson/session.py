@@ -67,6 +67,10 @@ _RESTORES: Final = re.compile(
 )
 _WRITES: Final = re.compile(r"(TLSet [0-9]+, XY\([^()]*\)|TLClr [0-9]+)", re.ASCII)
 
+# Each request asks for them, and before Python 3.12 a member of an Enum is found slowly.
+_LOCK, _HELD, _EXCHANGE = Checkpoint.LOCK, Checkpoint.HELD, Checkpoint.EXCHANGE
+_LOOK, _ACT = CommandClass.LOOK, CommandClass.ACT
+
 
 def command_class_of(request: Request) -> CommandClass:
     """Return what ``request`` does.
@@ -76,26 +80,26 @@ def command_class_of(request: Request) -> CommandClass:
     """
     name = request.name.lower()
     if name.startswith("get") or name in _SESSION:
-        return CommandClass.LOOK
+        return _LOOK
     if name == "reset":
         return CommandClass.RESET
     if name in _CALM:
         return CommandClass.CALM
     if name == "execute" and request.parameters:
         return _of_statement(request.parameters[0])
-    return CommandClass.ACT
+    return _ACT
 
 
 def _of_statement(statement: str) -> CommandClass:
     if ";" in statement:
-        return CommandClass.ACT
+        return _ACT
     if _LOOKS.fullmatch(statement):
-        return CommandClass.LOOK
+        return _LOOK
     if _RESTORES.fullmatch(statement):
         return CommandClass.RESTORE
     if _WRITES.fullmatch(statement):
         return CommandClass.WRITE
-    return CommandClass.ACT
+    return _ACT
 
 
 def as_sent(request: Request) -> str:
@@ -188,7 +192,7 @@ class EpsonSession(EpsonConversation):
                     self._end(error)
                     raise
         finally:
-            checkpoint(Checkpoint.EXCHANGE, what)
+            checkpoint(_EXCHANGE, what)
 
     def start_execute(self, statement: Statement) -> PendingExecute:
         """Send a statement that takes its time; its answer is collected by name later."""
@@ -211,7 +215,7 @@ class EpsonSession(EpsonConversation):
                     self._end(error)
                     raise
         finally:
-            checkpoint(Checkpoint.EXCHANGE, what)
+            checkpoint(_EXCHANGE, what)
         return pending
 
     def uninterrupted(self) -> AbstractContextManager[None]:
@@ -261,12 +265,12 @@ class EpsonSession(EpsonConversation):
         what = as_shown(request)
         if not self._codec.carries(request.name, *request.parameters):
             self._line.require_carried(request.name, *request.parameters)
-        checkpoint(Checkpoint.LOCK, what)
+        checkpoint(_LOCK, what)
         return what
 
     def _admit(self, request: Request, what: str) -> None:
         """Refuse, under the lock, what is not allowed now or a stop forbids."""
-        checkpoint(Checkpoint.HELD, what)
+        checkpoint(_HELD, what)
         self._check_usable(request)
         self.latch.admit(command_class_of(request), what)
         if request.name.lower() in _SETS_BACK:

@@ -21,6 +21,8 @@ from robolink.protocols.epson_text._commands import (
 )
 from robolink.protocols.epson_text._events import BadRequest, ErrorCode, Refusal, Reply, Request
 
+_STATEMENT: Final = ParameterForm.STATEMENT  # before Python 3.12 a member is found slowly
+
 _MAX_TEXT: Final = 4060
 """Largest number of bytes of a statement, and of its printed output (docs/reference/epson.md 1.5).
 """
@@ -170,7 +172,7 @@ def write_reply(reply: Reply, encoding: str) -> bytes:
     if not (reply.name.isascii() and reply.name.isalnum()):
         raise _unsendable(reply, tr("its name is not made of ASCII letters and digits"))
     if reply.text is None:
-        return _write_fields(reply, encoding)
+        return _written_fields(reply.name, reply.fields, encoding)
     if reply.fields:
         raise _unsendable(reply, tr("it has both fields and a text"))
     if '"\r' in reply.text or '"\n' in reply.text:
@@ -182,14 +184,14 @@ def write_reply(reply: Reply, encoding: str) -> bytes:
 
 
 @lru_cache(maxsize=256)
-def _write_fields(reply: Reply, encoding: str) -> bytes:
+def _written_fields(name: str, fields: tuple[str, ...], encoding: str) -> bytes:
     """Write one without a text; a poll is given the same few over and over."""
-    payload = ",".join(reply.fields)
-    if not reply.fields or payload.count(",") != len(reply.fields) - 1:
+    reply, payload = Reply(name, fields), ",".join(fields)
+    if not fields or payload.count(",") != len(fields) - 1:
         raise _unsendable(reply, tr("it needs at least one field, and no comma in any"))
     if payload.startswith(_QUOTE) or _breaks_line(payload):
         raise _unsendable(reply, tr("a quote or a line end would be mistaken for a frame"))
-    return _encoded(reply, f"#{reply.name},{payload}", encoding)
+    return _encoded(reply, f"#{name},{payload}", encoding)
 
 
 def write_refusal(refusal: Refusal, encoding: str) -> bytes:
@@ -269,7 +271,7 @@ def read_parameters(command: RemoteCommand, payload: str) -> tuple[str, ...] | N
 def write_parameters(command: RemoteCommand, parameters: tuple[str, ...]) -> str | None:
     """Return ``parameters`` as one text, ``None`` when a device could read anything else."""
     payload = ",".join(parameters)
-    if command.form is ParameterForm.STATEMENT:
+    if command.form is _STATEMENT:
         if _QUOTE in payload:  # a quote cannot be escaped (docs/reference/spel.md 1)
             return None
         payload = f"{_QUOTE}{payload}{_QUOTE}"
@@ -278,10 +280,10 @@ def write_parameters(command: RemoteCommand, parameters: tuple[str, ...]) -> str
 
 
 def _read(command: RemoteCommand, payload: str) -> tuple[str, ...] | None:
+    if command.form is _STATEMENT:  # most are
+        return _read_statement(payload)
     most = command.max_parameters
     match command.form:
-        case ParameterForm.STATEMENT:  # most are
-            return _read_statement(payload)
         case ParameterForm.NUMBERS:
             numbers = tuple(text.strip() for text in payload.split(",")[:most])
             if command.bare and not any(numbers):

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, Generic, TypeVar, overload
+from operator import attrgetter
+from typing import Any
 
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.device.wire_record import MotionLog
@@ -27,24 +28,13 @@ from robolink_simulators.epson.memory.tools import ToolMemory
 REMOTE_ETHERNET = 26
 """CtrlDev of a controller run over Remote Ethernet (docs/reference/spel.md 9)."""
 
-_T = TypeVar("_T")
 
-
-class _OfTheRobotInForce(Generic[_T]):
-    """An attribute of the current robot."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    @overload
-    def __get__(self, machine: None, owner: type) -> "_OfTheRobotInForce[_T]": ...
-    @overload
-    def __get__(self, machine: "Machine", owner: type) -> _T: ...
-    def __get__(self, machine: "Machine | None", owner: type) -> Any:
-        return self if machine is None else getattr(machine.robot, self._name)
-
-    def __set__(self, machine: "Machine", value: _T) -> None:
-        setattr(machine.robot, self._name, value)
+def _of_robot(name: str) -> Any:  # noqa: ANN401 - of the class that its annotation names
+    """Return an attribute of the current robot; each statement asks for several."""
+    return property(
+        attrgetter(f"robot.{name}"),
+        lambda machine, value: setattr(machine.robot, name, value),
+    )
 
 
 class Machine:
@@ -75,22 +65,22 @@ class Machine:
         control_device: What CtrlDev gives.
     """
 
-    model = _OfTheRobotInForce[RobotModel]()
-    serial = _OfTheRobotInForce[str]()
-    arm = _OfTheRobotInForce[Arm]()
-    tools = _OfTheRobotInForce[ToolMemory]()
-    points = _OfTheRobotInForce[PointTable]()
-    locals = _OfTheRobotInForce[LocalTable]()
-    parameters = _OfTheRobotInForce[MotionParameters]()
-    settings = _OfTheRobotInForce[RobotSettings]()
-    pallets = _OfTheRobotInForce[PalletTable]()
-    control_points = _OfTheRobotInForce[ControlPoints]()
-    kept = _OfTheRobotInForce[KeptDefinitions]()
-    sensed = _OfTheRobotInForce[bool]()
-    till_met = _OfTheRobotInForce[bool]()
-    found = _OfTheRobotInForce[Point | None]()
-    motors_on = _OfTheRobotInForce[bool]()
-    power_high = _OfTheRobotInForce[bool]()
+    model: RobotModel = _of_robot("model")
+    serial: str = _of_robot("serial")
+    arm: Arm = _of_robot("arm")
+    tools: ToolMemory = _of_robot("tools")
+    points: PointTable = _of_robot("points")
+    locals: LocalTable = _of_robot("locals")
+    parameters: MotionParameters = _of_robot("parameters")
+    settings: RobotSettings = _of_robot("settings")
+    pallets: PalletTable = _of_robot("pallets")
+    control_points: ControlPoints = _of_robot("control_points")
+    kept: KeptDefinitions = _of_robot("kept")
+    sensed: bool = _of_robot("sensed")
+    till_met: bool = _of_robot("till_met")
+    found: Point | None = _of_robot("found")
+    motors_on: bool = _of_robot("motors_on")
+    power_high: bool = _of_robot("power_high")
 
     def __init__(
         self,

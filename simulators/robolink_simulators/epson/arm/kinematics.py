@@ -43,6 +43,9 @@ point that prints 0.000 for X and Y is on the axis.
 _FIRST_TURN_MIDDLE_DEG = 90.0
 _HALF = 180.0
 
+ScaraPlace = tuple[float, float, float, float]
+"""Where the flange of a SCARA is: x, y, z in mm and u in degrees."""
+
 
 def _scara_hand(model: RobotModel, joints: Joints) -> Hand:
     """Return the hand; a stretched arm counts as right.
@@ -88,8 +91,10 @@ def _scara_forward(model: RobotModel, joints: Joints) -> Pose:
     )
 
 
-def _scara_solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) -> Joints:
-    """Return the joints that put the flange at ``flange``, whatever their ranges.
+def scara_joints(
+    model: RobotModel, flange: ScaraPlace, hand: Hand, posture: Posture | None
+) -> Joints:
+    """Return the joints that put the flange of a SCARA somewhere, whatever their ranges.
 
     Joint 1 is taken within half a turn of the middle of its range, or in the turn of its flag. An
     RS whose flange is on the axis of joint 1 takes J1Angle, 0 where the point has none (documented
@@ -98,8 +103,9 @@ def _scara_solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) 
     Raises:
         OutOfReach: The position is too far out or too far in for the two arms.
     """
+    x_mm, y_mm, z_mm, u_deg = flange
     a1_mm, a2_mm = model.lengths_mm
-    distance_sq = flange.x_mm * flange.x_mm + flange.y_mm * flange.y_mm
+    distance_sq = x_mm * x_mm + y_mm * y_mm
     cosine = (distance_sq - a1_mm**2 - a2_mm**2) / (2 * a1_mm * a2_mm)
     if not abs(cosine) <= 1 + _ROUNDING:
         raise OutOfReach(
@@ -109,10 +115,11 @@ def _scara_solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) 
     if hand is _LEFT:
         bend = -bend
     across, along = a2_mm * math.sin(bend), a1_mm + a2_mm * math.cos(bend)
-    j1_deg = math.degrees(math.atan2(flange.y_mm, flange.x_mm) - math.atan2(across, along))
+    j1_deg = math.degrees(math.atan2(y_mm, x_mm) - math.atan2(across, along))
     j2_deg = math.degrees(bend)
     low, high = model.ranges[0]
     if model.mechanism is _FOLDED:
+        posture = posture or PLAIN
         if distance_sq < _ON_THE_AXIS_MM**2:
             j1_deg, j2_deg = posture.j1_angle_deg or 0.0, _HALF
         else:
@@ -126,8 +133,8 @@ def _scara_solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) 
         j1_deg = within(low, high, j1_deg)
     added = model.offsets
     j2_deg -= added.j2_deg
-    j4_deg = flange.u_deg - added.u_deg - j1_deg - j2_deg
-    return Joints(j1_deg, j2_deg, flange.z_mm - added.z_mm, j4_deg)
+    j4_deg = u_deg - added.u_deg - j1_deg - j2_deg
+    return Joints(j1_deg, j2_deg, z_mm - added.z_mm, j4_deg)
 
 
 PLAIN: Final = Posture()
@@ -163,10 +170,13 @@ def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None =
     Raises:
         OutOfReach: The arms are too short, or cannot fold far enough.
     """
-    posture = posture or PLAIN
     if model.six_axes:
-        return six_axes.solve(model, flange, hand, posture)
-    return _scara_solve(model, flange, hand, posture)
+        return six_axes.solve(model, flange, hand, posture or PLAIN)
+    return scara_joints(model, _scara_place(flange), hand, posture)
+
+
+def _scara_place(flange: Pose) -> ScaraPlace:
+    return flange.x_mm, flange.y_mm, flange.z_mm, flange.u_deg
 
 
 def inverse(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None = None) -> Joints:
@@ -192,7 +202,8 @@ def continued(model: RobotModel, flange: Pose, near: Joints) -> Joints:
     if model.six_axes:
         joints = six_axes.solve_near(model, frame_of(flange), near)
     else:
-        joints = _scara_solve(model, flange, hand_of(model, near), _kept(model, near))
+        hand, posture = hand_of(model, near), _kept(model, near)
+        joints = scara_joints(model, _scara_place(flange), hand, posture)
     check_ranges(model, joints)
     check_depth(model, joints)
     return joints
@@ -252,7 +263,7 @@ def tip_of(model: RobotModel, flange: Pose, offset: ToolOffset | None, *, tool: 
     not part of its pose (assumed).
     """
     if offset is None:
-        return _carried(flange, flange.coordinates(), tool=tool)
+        return _of_tool(flange, tool)
     if model.six_axes:
         return pose_of_frame(frame_of(flange) @ tool_frame(offset), flange, tool=tool)
     angles = (flange.u_deg + offset.u_deg, flange.v_deg, flange.w_deg)
@@ -272,21 +283,24 @@ def tip_place(model: RobotModel, flange: Pose, offset: ToolOffset | None) -> Vec
 def flange_of(model: RobotModel, tip: Pose, offset: ToolOffset | None) -> Pose:
     """Return the flange pose that puts the tool's tip at ``tip``; undoes :func:`tip_of`."""
     if offset is None:
-        return _carried(tip, tip.coordinates(), tool=0)
+        return _of_tool(tip, 0)
     if model.six_axes:
         return pose_of_frame(frame_of(tip) @ tool_frame(offset).inverse(), tip, tool=0)
     x, y, z, u, v, w = tip.coordinates()
     return _carried(tip, (*scara_flange((x, y, z), u, offset), v, w), tool=0)
 
 
-def scara_flange(
-    tip_mm: Vector, u_deg: float, offset: ToolOffset
-) -> tuple[float, float, float, float]:
-    """Return x, y, z in mm and u in degrees of a SCARA's flange, from those of a tool's tip."""
+def scara_flange(tip_mm: Vector, u_deg: float, offset: ToolOffset) -> ScaraPlace:
+    """Return where a SCARA's flange is, from where a tool's tip is."""
     x, y, z = tip_mm
     u = u_deg - offset.u_deg
     dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, u)
     return (x - dx_mm, y - dy_mm, z - offset.z_mm, u)
+
+
+def _of_tool(pose: Pose, tool: int) -> Pose:
+    """Return ``pose`` as that of a tool, itself where it is: most are asked of the flange."""
+    return pose if pose.tool == tool else _carried(pose, pose.coordinates(), tool=tool)
 
 
 def _carried(pose: Pose, at: tuple[float, ...], *, tool: int) -> Pose:

@@ -12,12 +12,13 @@ from typing import Final, Protocol, Self
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.kinematics import (
+    ScaraPlace,
     flange_of,
     forward,
     hand_of,
     posture_of,
     scara_flange,
-    solve,
+    scara_joints,
 )
 from robolink_simulators.epson.arm.robots import Joints, RobotModel, check_depth, check_ranges
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
@@ -94,7 +95,6 @@ TimeLaw = Ramp | BrakedRamp
 FULL_SPEED_AFTER_S: Final = 0.2
 """Time in seconds to a joint's top speed at Accel 100 (assumed)."""
 
-_NO_TOOL: Final = ToolOffset()
 _STILL = 1e-9
 _NO_TURN_DEG = 1e-6
 """Turn of a leg that counts as none: what rounding leaves."""
@@ -219,20 +219,25 @@ class LineLeg(RampedLeg):
 
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the line."""
-        return solve(self.model, self._flange_after(share), self.hand, self.posture)
+        return scara_joints(self.model, self._place_after(share), self.hand, self.posture)
 
     def _flange_after(self, share: float) -> Pose:
+        if share >= 1:
+            return flange_of(self.model, self.end, self.offset)
+        return Pose(*self._place_after(share), tool=0)
+
+    def _place_after(self, share: float) -> ScaraPlace:
         a, b = self.start, self.end
         if share >= 1:
-            return flange_of(self.model, b, self.offset)
-        tip_mm = (
-            a.x_mm + (b.x_mm - a.x_mm) * share,
-            a.y_mm + (b.y_mm - a.y_mm) * share,
-            a.z_mm + (b.z_mm - a.z_mm) * share,
-        )
-        u_deg = a.u_deg + (b.u_deg - a.u_deg) * share
-        offset = self.offset or _NO_TOOL
-        return Pose(*scara_flange(tip_mm, u_deg, offset), tool=0)
+            x_mm, y_mm, z_mm, u_deg = b.x_mm, b.y_mm, b.z_mm, b.u_deg
+        else:
+            x_mm = a.x_mm + (b.x_mm - a.x_mm) * share
+            y_mm = a.y_mm + (b.y_mm - a.y_mm) * share
+            z_mm = a.z_mm + (b.z_mm - a.z_mm) * share
+            u_deg = a.u_deg + (b.u_deg - a.u_deg) * share
+        if self.offset is None:
+            return x_mm, y_mm, z_mm, u_deg
+        return scara_flange((x_mm, y_mm, z_mm), u_deg, self.offset)
 
 
 def plan_go(

@@ -1,10 +1,14 @@
 """The command window: the one statement that Execute runs (docs/reference/epson.md 1.5)."""
 
+from typing import Final
+
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.link import PendingRequest
 from robolink_simulators.epson.spel import Interpreter, SpelError, StatementExecution
 from robolink_simulators.faults import FaultAction
+
+_IGNORE_WRITE: Final = FaultAction.IGNORE_WRITE  # before Python 3.12 a member is found slowly
 
 
 class SpelWindow:
@@ -40,7 +44,7 @@ class SpelWindow:
 
     def start(self, statement: str, exchange: PendingRequest, now_ns: int) -> None:
         """Begin a statement; the exchange is answered when it has ended."""
-        if exchange.meets(FaultAction.IGNORE_WRITE):
+        if exchange.meets(_IGNORE_WRITE):
             exchange.reply()
             return
         self._aborted = False

@@ -8,6 +8,7 @@ Source: docs/reference/epson.md 1.1, 1.2.
 from abc import ABC
 from collections.abc import Sequence
 from functools import partial
+from typing import Final
 
 from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec
@@ -32,6 +33,8 @@ from robolink_simulators.epson.remote.link import (
     shown_request,
 )
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan, LinkKind
+
+_NO_TASK: Final = Task.NONE  # before Python 3.12 a member of an Enum is found slowly
 
 
 def arriving(
@@ -272,7 +275,7 @@ class RequestService(HostedDevice, ABC):
     @property
     def _unfinished(self) -> bool:
         """Whether a statement or a task runs."""
-        return self._window.busy or self.condition.task is not Task.NONE
+        return self._window.busy or self.condition.task is not _NO_TASK
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return which parts of it are sent, and when."""

@@ -50,13 +50,10 @@ def marked(line: str) -> tuple[str, list[str]]:
     """
     if not _QUOTES.isdisjoint(line):
         return line, []
-    numbers = list[str]()
-
-    def mark(found: re.Match[str]) -> str:
-        numbers.append(found[0])
-        return _mark(len(numbers) - 1)
-
-    return _NUMBER.sub(mark, line), numbers
+    numbers: list[str] = _NUMBER.findall(line)
+    first, *others = _NUMBER.split(line)
+    marks = [_mark(place) + text for place, text in enumerate(others)]
+    return "".join([first, *marks]), numbers
 
 
 def filler(tree: tuple[Any, ...], count: int) -> Filler | None:
@@ -246,8 +243,13 @@ def _parsed(text: str) -> tuple[Statement, ...]:
     fill = _shape(shape, len(numbers)) if numbers else None
     if fill is None:
         return _read(text)
-    statements: tuple[Statement, ...] = fill([Literal(number_value(number)) for number in numbers])
+    statements: tuple[Statement, ...] = fill([Literal(_value(number)) for number in numbers])
     return statements
+
+
+def _value(number: str) -> int | float:
+    """Return the value of a number that was marked: it has no base of its own, and few digits."""
+    return float(number) if "." in number else int(number)
 
 
 @lru_cache(maxsize=256)

@@ -21,6 +21,8 @@ LONGEST_PRINT: Final = 256
 LONGEST_PRINT_TO: Final = 1024
 """Most bytes that one Print can send to a TCP/IP port (docs/reference/spel.md 3.2)."""
 
+_SCARA: Final = Mechanism.SCARA  # before Python 3.12 a member of an Enum is found slowly
+
 _EXPONENT_FROM = 1e14
 _EXPONENT_BELOW = 1e-4
 _MARKS = re.compile(r"([#0,]*)(?:\.([#0]*))?")
@@ -45,7 +47,7 @@ def number_text(value: Number) -> str:
 
 
 def _printed(point: Point, model: RobotModel) -> PrintedPoint:
-    posture = None if model.mechanism is Mechanism.SCARA else point.posture or PLAIN
+    posture = None if model.mechanism is _SCARA else point.posture or PLAIN
     return PrintedPoint.of(
         point.coordinates,
         hand=point.hand,

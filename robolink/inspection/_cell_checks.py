@@ -35,6 +35,7 @@ from robolink.inspection._check_record import (
 from robolink.inspection._check_results import CellCheck, CheckFailure
 from robolink.inspection._inspection import Inspection, inspect
 from robolink.journal import (
+    Meetings,
     name_journals,
     open_journal,
     require_home,
@@ -164,8 +165,10 @@ def check_cells(
         listener = _listener(places, tell)
         if listener is not None:
             stack.enter_context(listener)
-        looker = _Looker(since, tools, connect or _connected, listener, deadline_s, tell)
-        recorder = Recorder(places, signature or signature_here(VERSION), keep_days)
+        recorder = Recorder(places, signature or signature_here(VERSION), keep_days, tell)
+        looker = _Looker(
+            since, tools, connect or _connected, listener, recorder.meetings, deadline_s, tell
+        )
         together = min(at_once, len(places))
         ended = _together(looker, places, together) if together > 1 else map(looker.check, places)
         try:
@@ -199,11 +202,12 @@ class _Looker:
         tools: Callable[[Controller], ToolState],
         connect: Connect,
         listener: SharedStopListener | None,
+        meetings: Meetings,
         deadline_s: float,
         tell: Callable[[str], None],
     ) -> None:
         self._since, self._tools, self._connect = since, tools, connect
-        self._listener, self._tell = listener, tell
+        self._listener, self._meetings, self._tell = listener, meetings, tell
         self.deadline_s = deadline_s
         self.ending = Event()
 
@@ -215,7 +219,8 @@ class _Looker:
         met: list[Met] = []
         failure = None
         try:
-            self._look(place, deadline, found, met)
+            with self._meetings.gathered(place.called):
+                self._look(place, deadline, found, met)
         except RobolinkError as error:
             failure = CheckFailure.of(error)
         seconds = (clock.now_ns() - begun_ns) / NS_PER_S

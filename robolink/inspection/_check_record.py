@@ -1,6 +1,6 @@
 """The record of checks: each in the journal of its cell, beside the chain."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -10,6 +10,7 @@ from robolink.errors import JournalError, RobolinkError
 from robolink.inspection._check_results import CellCheck, CheckFailure
 from robolink.journal import (
     Journal,
+    Meetings,
     default_location,
     memory_journal,
     not_at_home,
@@ -91,14 +92,24 @@ class Recorder:
         places: The cells.
         signature: Who checks.
         keep_days: For how many days checks are kept; ``None`` deletes none.
+        tell: Receives sentences about a cell that a person should know once.
+
+    Attributes:
+        meetings: Who was met, to be recorded with the checks.
     """
 
     def __init__(
-        self, places: Sequence[CheckPlace], signature: Signature, keep_days: int | None
+        self,
+        places: Sequence[CheckPlace],
+        signature: Signature,
+        keep_days: int | None,
+        tell: Callable[[str], None] = lambda _sentence: None,
     ) -> None:
         self._places = places
         self._signature = signature
         self._keep_days = keep_days
+        self._tell = tell
+        self.meetings = Meetings()
         self._done: dict[int, CellCheck] = {}
         self._waiting: list[EndedCheck] = []
 
@@ -117,6 +128,7 @@ class Recorder:
 
     def store(self) -> None:
         """Record what waits for that; a check that cannot be recorded has failed."""
+        remarks = [*self.meetings.record()]
         waiting, self._waiting = self._waiting, []
         groups: dict[tuple[str, str], list[EndedCheck]] = {}
         for one in waiting:
@@ -136,6 +148,8 @@ class Recorder:
                         self._fail([one], error)
             except JournalError as error:  # nor would one alone be stored; perhaps all of them were
                 self._fail(group, error)
+        for called, remark in remarks:
+            self._tell(f"{called}: {remark}")
 
     def _fail(self, group: Sequence[EndedCheck], error: JournalError) -> None:
         for one in group:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from robolink.journal._homes import not_at_home as not_at_home
     from robolink.journal._homes import require_home as require_home
     from robolink.journal._homes import this_computer as this_computer
+    from robolink.journal._identity import Meetings as Meetings
     from robolink.journal._journal import Journal as Journal
     from robolink.journal._lease_view import LEASE_S as LEASE_S
     from robolink.journal._lease_view import LeaseHolder as LeaseHolder
@@ -61,6 +62,7 @@ else:
             ),
             "_homes": "CellHome computer_key not_at_home require_home this_computer",
             "_copies": "JournalCopy copy_journals",
+            "_identity": "Meetings",
             "_journal": "Journal",
             "_lease_view": (
                 "LEASE_S LeaseHolder LeaseView describe_holder signature_here this_process"

@@ -1,8 +1,11 @@
 """Which controller a log is about: its own answer, and the record of that."""
 
 import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink.errors import JournalError, RemoteProtocolError
 from robolink.messages import tr
@@ -12,7 +15,7 @@ from robolink.timing import wall_label
 
 if TYPE_CHECKING:
     from robolink.journal.store.state_rows import NameRows
-    from robolink.journal.store.store import Store
+    from robolink.journal.store.store import Store, Tables
 
 _LOOPBACK_PORT: Final = re.compile(r"[/@](?:127\.[\d.]+|localhost|\[::1\]):(\d+)")
 _FIRST_LENT_PORT: Final = 32768
@@ -141,21 +144,116 @@ class Naming:
     def _recorded(self, found: Identity, meeting: _Meeting, signature: Signature) -> bool:
         """Keep what is new; return whether the journal took it."""
         name = meeting.names.identity
-        if meeting.before == name and not (meeting.unclaimed or meeting.new_robots):
+        claims = bool(meeting.unclaimed or meeting.new_robots)
+        if meeting.before == name and not claims:
             return True
-        try:
-            with self._store.write() as tables:
-                tables.names.meet(found.address, name, wall_label())
-                for former in meeting.unclaimed:
-                    tables.names.carry_over(former, name)
-                for robot in meeting.new_robots:
-                    tables.names.note_robot(robot, name)
-                tables.entries.append(name, signature, "", _entries(found, meeting))
-        except JournalError:
-            # Reading goes on without it; the next intent will report the journal's error.
-            return False
-        self.remarks = _remarks(found, meeting)
+        remarks = _remarks(found, meeting)
+        gathering = _gathering.get()
+        # A record under another name is found only once the journal knows whose it is.
+        if gathering is not None and not claims:
+            meetings, called = gathering
+            meetings.add(_Gathered(called, self._store, found, signature, remarks))
+        else:
+            try:
+                with self._store.write() as tables:
+                    _keep(tables, found, meeting, signature)
+            except JournalError:
+                # Reading goes on without it; the next intent will report the journal's error.
+                return False
+        self.remarks = remarks
         return True
+
+
+class _Gathered(NamedTuple):
+    """A controller that was met and is not on record yet."""
+
+    called: str
+    store: "Store"
+    found: Identity
+    signature: Signature
+    told: tuple[str, ...]
+
+    def keep(self, tables: "Tables") -> list[tuple[str, str]]:
+        """Record it; return what is to be told now that those before it are on record."""
+        meeting = _meeting(tables.names, self.found, tables.names.at(self.found.address))
+        _keep(tables, self.found, meeting, self.signature)
+        said = _remarks(self.found, meeting)
+        return [(self.called, remark) for remark in said if remark not in self.told]
+
+
+class Meetings:
+    """Controllers that were met, and are recorded many at a time; each alone waits for the disk.
+
+    For whoever only reads: what a killed process had not recorded yet is asked again, but a marker
+    under a name that is not on record would block nobody. A controller with a record under another
+    name, or with robots that are new, does not wait: this very look reads that record.
+
+    Example:
+        >>> from robolink.journal import Meetings
+        >>> meetings = Meetings()
+        >>> with meetings.gathered("press-1"):
+        ...     pass  # connect, look, and close
+        >>> list(meetings.record())
+        []
+    """
+
+    def __init__(self) -> None:
+        self._met: list[_Gathered] = []
+
+    @contextmanager
+    def gathered(self, called: str) -> Iterator[None]:
+        """Within the block, let this thread's meetings wait until they are recorded.
+
+        Args:
+            called: Whom a sentence is about.
+        """
+        outer = _gathering.set((self, called))
+        try:
+            yield
+        finally:
+            _gathering.reset(outer)
+
+    def add(self, met: _Gathered) -> None:
+        """Keep one until it is recorded."""
+        self._met.append(met)
+
+    def record(self) -> Iterator[tuple[str, str]]:
+        """Record those that wait; yield what a person should know once, and of whom.
+
+        What cannot be recorded fails nothing else: that controller is asked again next time.
+        """
+        waiting, self._met = self._met, []
+        for store in dict.fromkeys(one.store for one in waiting):
+            yield from _stored(store, [one for one in waiting if one.store is store])
+
+
+_gathering: ContextVar[tuple[Meetings, str] | None] = ContextVar("gathering", default=None)
+"""Where this thread's meetings wait, and whom they are about."""
+
+
+def _stored(store: "Store", group: Sequence[_Gathered]) -> list[tuple[str, str]]:
+    keeping = False
+    try:
+        with store.write() as tables:
+            keeping = True
+            said = [one for met in group for one in met.keep(tables)]
+            keeping = False
+        return said
+    except JournalError:
+        if keeping and len(group) > 1:  # what is wrong with one keeps no other off the record
+            return [one for met in group for one in _stored(store, [met])]
+        return []
+
+
+def _keep(tables: "Tables", found: Identity, meeting: _Meeting, signature: Signature) -> None:
+    """Record whom an address led to."""
+    name = meeting.names.identity
+    tables.names.meet(found.address, name, wall_label())
+    for former in meeting.unclaimed:
+        tables.names.carry_over(former, name)
+    for robot in meeting.new_robots:
+        tables.names.note_robot(robot, name)
+    tables.entries.append(name, signature, "", _entries(found, meeting))
 
 
 def _told_twice(who: Who, first: Identity) -> Identity:

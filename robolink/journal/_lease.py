@@ -12,9 +12,11 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from robolink.errors import LeaseHeldError, LeaseLostError
+from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal._lease_view import FREE, LEASE_S, LeaseHolder, LeaseView
 from robolink.journal.store.chain import canonical, storable
+from robolink.journal.store.failures import reason_of
+from robolink.journal.store.reserve import END_FRAMES, JOB_FRAMES
 from robolink.messages import in_english, tr
 from robolink.model import NewEntry, new_operation
 from robolink.package_log import PackageLog
@@ -185,7 +187,18 @@ class Lease:
         if not self.held or now_ns - self._beaten_ns < BEAT_S * NS_PER_S:
             return
         self._beaten_ns = now_ns
-        with self._store.write() as tables:
+        try:
+            self._beat(now_ns, JOB_FRAMES)
+        except JournalError as error:
+            cause = error.__cause__
+            if cause is None or reason_of(cause) != "full":
+                raise
+            # With that error the log began anew, if it could. If not, signs of life may take what
+            # is meant for the steps of a job, and leave what is meant for its end.
+            self._beat(now_ns, END_FRAMES)
+
+    def _beat(self, now_ns: int, leaves: int) -> None:
+        with self._store.write(leaves=leaves) as tables:
             if not tables.leases.renew(self.controller, self._epoch, self._token, now_ns):
                 self._lose(tables.leases)
 

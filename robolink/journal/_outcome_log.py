@@ -19,6 +19,7 @@ from robolink.journal._lease_view import (
     run_of,
     this_process,
 )
+from robolink.journal.store.reserve import END_FRAMES, JOB_FRAMES
 from robolink.messages import tr
 from robolink.model import (
     NO_HISTORY,
@@ -38,8 +39,10 @@ if TYPE_CHECKING:
     from robolink.journal._journal import Journal
     from robolink.journal.store.store import Store, Tables
 
+_SET: Final = MarkerKind.SET  # before Python 3.12 a member of an Enum is found slowly
+
 _BEGINNINGS: Final = {
-    MarkerKind.SET: EntryKind.INTENT,
+    _SET: EntryKind.INTENT,
     MarkerKind.CHANGE: EntryKind.INTENT,
     MarkerKind.SELECTION: EntryKind.SELECTION,
 }
@@ -188,9 +191,8 @@ class JournalOutcomeLog:
         with seen_through(), self._lock:
             names = self._named()
             last = not self._holds and not self._begun - {operation}
-            with self._writing(
-                tr("The last command counts as unfinished."), tr("Then run 'robolink recover'.")
-            ) as tables:
+            left = tr("The last command counts as unfinished."), tr("Then run 'robolink recover'.")
+            with self._writing(*left, ends=True) as tables:
                 if operation in self._begun:
                     try:
                         self._lease.prove(tables.leases, last=last)
@@ -225,7 +227,7 @@ class JournalOutcomeLog:
             self._refuse_lost()
         with seen_through(), self._lock:
             name = self._named().record
-            with self._writing() as tables:
+            with self._writing(within=bool(self.change)) as tables:
                 self._put(tables, name, entries)
 
     def answered(self, entry: NewEntry) -> None:
@@ -261,10 +263,7 @@ class JournalOutcomeLog:
             leave_trace(name, self._journal.location, newest)
         except OSError as error:
             raise JournalError(
-                tr(
-                    "robolink cannot store the place of its record: {cause}.",
-                    cause=error,
-                ),
+                tr("robolink cannot store the place of its record: {cause}.", cause=error),
                 remedy=tr(
                     "Make the folder writable, or set ROBOLINK_STATE_DIR. Next: robolink recover"
                 ),
@@ -390,8 +389,7 @@ class JournalOutcomeLog:
             name = self._named().record
             with self._writing(_untouched()) as tables:
                 ended = self._lease.end(tables.leases, reason, self.signature.operator)
-                entries = () if ended is None else (ended,)
-                self._put(tables, name, entries)
+                self._put(tables, name, () if ended is None else (ended,))
             self._lease.look()
 
     def note_client(self, client: str) -> None:
@@ -410,11 +408,12 @@ class JournalOutcomeLog:
         return run_of(client, self._holder) if self.durable else None
 
     @contextmanager
-    def _writing(self, consequence: str = "", then: str = "") -> Iterator["Tables"]:
+    def _writing(self, *said: str, ends: bool = False, within: bool = False) -> Iterator["Tables"]:
         """Write in one transaction; answers that it recorded are kept no longer."""
+        leaves = 0 if ends else END_FRAMES if within or self._begun else JOB_FRAMES
         self._told = 0
         try:
-            with self._store.write(consequence, then) as tables:
+            with self._store.write(*said, leaves=leaves) as tables:
                 yield tables
         except JournalError as error:
             from robolink.journal.store.seal import MovedRecordError
@@ -466,7 +465,7 @@ class JournalOutcomeLog:
         """
         with seen_through(), self._lock:
             if self._lease.held:
-                with suppress(JournalError), self._store.write() as tables:
+                with suppress(JournalError), self._store.write(leaves=0) as tables:
                     self._lease.release(tables.leases)
                 self._lease.forget()
 
@@ -483,7 +482,7 @@ def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
     stored again to keep what has become of them.
     """
     kind, tool = _BEGINNINGS.get(marker.kind), marker.details.get("tool")
-    writes = marker.kind is MarkerKind.SET
+    writes = marker.kind is _SET
     if kind is None or (writes and tool is None) or not (writes or first):
         return ()
     return (_act(kind, marker),)

@@ -19,6 +19,7 @@ from robolink.errors import JournalError
 from robolink.files.durable import make_folder, sync_folder
 from robolink.journal._places import JournalPlace
 from robolink.journal.store import statements
+from robolink.journal.store.reserve import LogReserve
 from robolink.messages import tr
 from robolink.timing import Deadline, SystemClock
 
@@ -61,10 +62,13 @@ class DatabaseConnection:
         keyed_table: Ends the definition of a table that is its own index. A table and an index
             of it are two pages in each commit.
         driver: The driver's connection.
+        reserve: Keeps room on the disk for the ends of what has begun; ``None`` where that is the
+            affair of a server.
 
     Args:
         driver: The driver's connection.
         lasting: Whether what it leads to ends with it, as memory does, so that it stays open.
+        reserve: See above.
     """
 
     begin_writing: ClassVar[str] = "BEGIN IMMEDIATE"
@@ -94,8 +98,15 @@ class DatabaseConnection:
     keyed_table: ClassVar[str] = " WITHOUT ROWID"
     has_schemas: ClassVar[bool] = False
 
-    def __init__(self, driver: Any, *, lasting: bool = False) -> None:  # noqa: ANN401 - of two
+    def __init__(
+        self,
+        driver: Any,  # noqa: ANN401 - of two
+        *,
+        lasting: bool = False,
+        reserve: LogReserve | None = None,
+    ) -> None:
         self.driver = driver
+        self.reserve = reserve
         self._lasting = lasting
         self._cursor = driver.cursor()
 
@@ -111,8 +122,10 @@ class DatabaseConnection:
         """Close it; what was not committed is undone."""
         if self._lasting:
             self.roll_back()
-        else:
-            self.driver.close()
+            return
+        if self.reserve is not None:
+            self.reserve.close()  # first: Windows deletes no file that is open
+        self.driver.close()
 
     def run(self, statement: str, values: Values = NOTHING) -> int:
         """Run a statement with ``values`` by the names of its places.
@@ -302,10 +315,11 @@ def _to_write(path: Path) -> DatabaseConnection:
     connection = _connect(_uri(path, "mode=rw"))
     try:
         _prepare(connection)
+        reserve = LogReserve(path, connection)
     except BaseException:
         connection.close()
         raise
-    return DatabaseConnection(connection)
+    return DatabaseConnection(connection, reserve=reserve)
 
 
 def _connect(uri: str, wait_s: float | None = None) -> sqlite3.Connection:
@@ -322,6 +336,8 @@ def _prepare(connection: sqlite3.Connection) -> None:
         _begin_wal(connection)
     connection.execute("PRAGMA synchronous=FULL")
     connection.execute(f"PRAGMA wal_autocheckpoint={_LOG_PAGES}")
+    # Where a log begins anew, Apple's SQLite cuts it to 32 KiB, with the room that is kept in it.
+    connection.execute("PRAGMA journal_size_limit=-1")
     connection.execute("PRAGMA foreign_keys=ON")
 
 

@@ -1,11 +1,15 @@
 """Errors of the database, turned into errors that say what to do."""
 
+import errno
 from typing import Final
 
 from robolink.errors import JournalError
 from robolink.messages import joined, listed, tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
+_NO_ROOM: Final = {
+    code for name in ("ENOSPC", "EDQUOT", "EFBIG") if (code := getattr(errno, name, None))
+}
 # Result codes of SQLite (https://www.sqlite.org/rescode.html), the low byte.
 _SQLITE: Final = {
     3: "forbidden",
@@ -16,6 +20,7 @@ _SQLITE: Final = {
     11: "damaged",
     13: "full",
     14: "forbidden",
+    19: "refused",
     26: "foreign",
 }
 # Classes and codes of PostgreSQL (its manual, appendix A).
@@ -84,6 +89,8 @@ def reason_of(error: BaseException) -> str:
         return "forbidden"
     if isinstance(error, UnicodeDecodeError):
         return "damaged"  # a damaged byte in a text, or in the name in SQLite's message
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        return "full"
     code = getattr(error, "sqlite_errorcode", None)
     if isinstance(code, int):
         return _SQLITE.get(code & 0xFF, "")

@@ -154,6 +154,11 @@ class MarkerRows:
             found += [_marker(_Stored(*row)) for row in rows]
         return tuple(found)
 
+    def controllers(self, at_most: int) -> int:
+        """Return on how many controllers something is open; it counts no further than asked."""
+        rows = self._connection.rows(statements.CONTROLLERS_WITH_MARKERS, {"at_most": at_most})
+        return int(rows[0][0])
+
     def of_all(self) -> tuple[tuple[str, Marker], ...]:
         """Return every marker with the identity of its controller, oldest first.
 

@@ -152,6 +152,9 @@ RENAME_MARKER: Final = (
     f"UPDATE markers SET controller = :to_controller, details = :details {_THE_MARKER}"
 )
 REMOVE_MARKER: Final = f"DELETE FROM markers {_THE_MARKER}"
+CONTROLLERS_WITH_MARKERS: Final = """
+    SELECT count(*) FROM (SELECT DISTINCT controller FROM markers LIMIT :at_most) AS open_here
+"""
 
 # ---- Leases
 

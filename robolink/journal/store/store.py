@@ -7,7 +7,7 @@ the whole journal; ``verify`` reads the rest.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from typing import Final
 
 from robolink import runtime
@@ -25,7 +25,8 @@ from robolink.journal.store.connection import (
     backend_of,
 )
 from robolink.journal.store.entry_rows import DamagedHeadError, EntryRows, Filter
-from robolink.journal.store.failures import damaged_error, journal_error
+from robolink.journal.store.failures import damaged_error, journal_error, reason_of
+from robolink.journal.store.reserve import END_FRAMES, JOB_FRAMES, MOST_JOBS
 from robolink.journal.store.seal import (
     SEALED,
     Moved,
@@ -42,7 +43,12 @@ from robolink.messages import tr
 _NEWEST: Final = 20
 """Number of newest entries checked, of the journal and of the controller."""
 
+_BLAMELESS: Final = frozenset({"full", "locked", "refused"})
+"""Reasons of errors after which a file can be used as before."""
+
 _OF_FILES: Final = (OSError, UnicodeDecodeError)
+
+_COMMIT: Final = Checkpoint.COMMIT  # before Python 3.12 a member of an Enum is found slowly
 
 
 class Tables:
@@ -152,6 +158,24 @@ class Tables:
                 yield from ChainCheck.before(row).problems_of(row)
 
 
+def _keep_room(tables: Tables, leaves: int) -> None:
+    """Keep room for each job that will be open once a transaction is committed.
+
+    That is at least one job: a lease is taken before there is a marker, and it is to be released.
+
+    Args:
+        tables: Over the connection that is about to commit.
+        leaves: How much for each, in frames.
+
+    Raises:
+        OSError: The disk has none.
+    """
+    reserve = tables.connection.reserve
+    if reserve is not None:
+        jobs = max(1, tables.markers.controllers(MOST_JOBS))
+        reserve.keep(jobs * leaves)
+
+
 def _was_left(arriving: Moved, here: JournalPlace, left: JournalPlace | None) -> bool:
     """Return whether the journal that a record comes from is sealed, so that it counts here.
 
@@ -179,8 +203,8 @@ def _was_left(arriving: Moved, here: JournalPlace, left: JournalPlace | None) ->
 class Store:
     """Keeps one connection open and gives it to one thread at a time.
 
-    After any error the connection is dropped and the next use makes a new one, so that a
-    server that was restarted is found again.
+    After an error the connection is dropped and the next use makes a new one, so that a server that
+    was restarted is found again. That of a file stays open as long as it still can be used.
 
     Args:
         place: Where it is.
@@ -223,12 +247,16 @@ class Store:
         """Whether it outlives this process."""
         return bool(self._place.path or self._place.url)
 
-    def write(self, consequence: str = "", then: str = "") -> AbstractContextManager[Tables]:
+    def write(
+        self, consequence: str = "", then: str = "", *, leaves: int = JOB_FRAMES
+    ) -> AbstractContextManager[Tables]:
         """Run a block as one durable transaction; an exception undoes all of it.
 
         Args:
             consequence: What a failure means for the controller, one sentence.
             then: What to do once the journal can be used again.
+            leaves: How much room of the disk it leaves to each job that is open, in frames
+                (``reserve``): less within a job, and none at its end. It is refused without that.
 
         Raises:
             JournalError: It is not stored.
@@ -238,7 +266,7 @@ class Store:
                 tr("The journal {name} was opened for reading only.", name=self._place.name),
                 remedy=tr("Open it for writing to add to it."),
             )
-        return self._use(consequence, then, writing=True)
+        return self._use(consequence, then, writing=True, leaves=leaves)
 
     def read(self, consequence: str = "") -> AbstractContextManager[Tables]:
         """Run a block that only reads, and leave nothing open.
@@ -286,39 +314,62 @@ class Store:
                 self._backend = None
 
     @contextmanager
-    def _use(self, consequence: str, then: str = "", *, writing: bool) -> Iterator[Tables]:
+    def _use(
+        self, consequence: str, then: str = "", *, writing: bool, leaves: int = 0
+    ) -> Iterator[Tables]:
         if writing:
-            checkpoint(Checkpoint.COMMIT, "before")
+            checkpoint(_COMMIT, "before")
         with self._lock:
             try:
                 tables = self._connected(to_write=writing)
                 connection = tables.connection
                 if writing and connection.begin_writing:
                     connection.run(connection.begin_writing)
+                if leaves and connection.reserve is not None:
+                    connection.reserve.begin()
                 try:
                     yield tables
                 except BaseException:
                     connection.roll_back()
                     raise
                 if writing:
+                    if leaves:
+                        _keep_room(tables, leaves)
                     connection.commit()
                     self._grown = tables.entries.take_added() or self._grown
                 else:
                     connection.roll_back()
-            except JournalError:
-                self._drop()
+            except JournalError as error:
+                self._leave(error)
                 raise
             except DamagedHeadError as error:
                 self._drop()
                 raise damaged_error(str(error), self._place.name, consequence) from error
             except self._failures as error:
                 moves = self._moves_behind(error)
-                self._drop()
+                self._leave(error)
                 if moves:
                     raise MovedRecordError(moves, self._place.name, consequence) from error
                 raise journal_error(error, self._place.name, consequence, then) from error
         if writing:
-            checkpoint(Checkpoint.COMMIT, "after")
+            checkpoint(_COMMIT, "after")
+
+    def _leave(self, error: Exception) -> None:
+        """Undo what was begun after an error; drop a connection that may be to blame for it.
+
+        The last connection to a file deletes its log, and with it the room that is kept there.
+        """
+        reserve = None if self._tables is None else self._tables.connection.reserve
+        reason = reason_of(error)
+        blameless = isinstance(error, JournalError) or reason in _BLAMELESS
+        if self._tables is not None and reserve is not None and blameless:
+            with suppress(*self._failures):
+                self._tables.connection.roll_back()
+                if reason == "full":
+                    with suppress(*self._failures):
+                        reserve.begin_log_anew()
+                return
+        self._drop()
 
     def _moves_behind(self, error: Exception) -> tuple[Moved, ...]:
         """Return the moved records if the database refused to write one of them, else nothing."""
@@ -336,7 +387,9 @@ class Store:
         if self._tables is None:
             self._tables = self._connect(self._backend)
             self._file = self._place.file_now()
+            self._keep_again(self._tables)
         elif to_write and self._place.file_now() != self._file:
+            self._drop()
             raise JournalError(
                 tr("The journal {name} was moved or deleted.", name=self._place.name),
                 remedy=tr(
@@ -345,6 +398,23 @@ class Store:
                 ),
             )
         return self._tables
+
+    def _keep_again(self, tables: Tables) -> None:
+        """Keep room for the ends of open jobs, which may have gone with an earlier connection.
+
+        Where that fails, the next write says why.
+        """
+        connection = tables.connection
+        if connection.reserve is None:
+            return
+        with suppress(*self._failures):
+            if tables.markers.controllers(1):
+                try:
+                    connection.run(connection.begin_writing)
+                    connection.reserve.begin()
+                    _keep_room(tables, END_FRAMES)
+                finally:
+                    connection.roll_back()
 
     def _connect(self, backend: Backend) -> Tables:
         try:

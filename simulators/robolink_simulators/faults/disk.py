@@ -1,7 +1,8 @@
 """A disk that fails under SQLite databases: full, unwritable, with a sync that fails or lies.
 
 Nothing of the program under test is replaced: :class:`FaultyDisk` stands where SQLite hands bytes
-to the system (:mod:`robolink_simulators.faults.sqlite_vfs`). What each fault does:
+to the system (:mod:`robolink_simulators.faults.sqlite_vfs`), and where a log of SQLite's is opened
+beside it, as a journal does to make one longer. What each fault does:
 
 ======================  =======================================================================
 ``FULL``                a write that makes a file longer fails, as ENOSPC would (SQLITE_FULL)
@@ -18,13 +19,16 @@ Other files of the program (the traces beside a journal) are not SQLite's, and n
 shared memory of WAL is never on the disk. That a log was removed counts as synced.
 """
 
+import errno
+import io
+import os
 import random
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from typing import Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from robolink_simulators.faults.sqlite_vfs import (
     CREATE,
@@ -38,6 +42,9 @@ from robolink_simulators.faults.sqlite_vfs import (
     WatchedFile,
     files_for,
 )
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 _SECTOR: Final = 512
 _WITH: Final = ("", "-wal", "-journal")
@@ -62,6 +69,36 @@ class _Change:
     size_before: int
     data: bytes
     size_after: int
+
+
+class _WatchedLog(io.FileIO):
+    """A log that was opened beside SQLite."""
+
+    def __init__(self, path: str, disk: "FaultyDisk") -> None:
+        super().__init__(path, "r+b")
+        self._disk = disk
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        """Write, unless the disk is full or unwritable."""
+        end = self.tell() + memoryview(data).nbytes
+        self._disk.admit(longer=end > os.fstat(self.fileno()).st_size)
+        return super().write(data)
+
+
+_disks: Final = list["FaultyDisk"]()
+"""Those that are in use, the last one last."""
+_open: Final = io.open
+
+
+def _opened(file: Any, mode: str = "r", *more: Any, **named: Any) -> Any:  # noqa: ANN401 - as io.open
+    """Open a file; a log that is to be written beside SQLite is watched."""
+    if mode == "r+b" and isinstance(file, str | os.PathLike):
+        path = os.fspath(file)
+        disk = next((one for one in reversed(_disks) if one.watches(path)), None)
+        if disk is not None and path.endswith("-wal"):
+            disk.admit(longer=False)
+            return _WatchedLog(path, disk)
+    return _open(file, mode, *more, **named)
 
 
 class FaultyDisk:
@@ -97,11 +134,16 @@ class FaultyDisk:
     def __enter__(self) -> Self:
         self._files = files_for(self)
         self._files.begin()
+        _disks.append(self)
+        vars(io)["open"] = _opened
         return self
 
     def __exit__(self, *_details: object) -> None:
         self._faults.clear()
         self._files.end()
+        _disks.remove(self)
+        if not _disks:
+            vars(io)["open"] = _open
 
     def begin(self, fault: DiskFault, *, after: int = 0) -> None:
         """Begin a fault, after so many more successful writes."""
@@ -201,6 +243,22 @@ class FaultyDisk:
             after = max(size, offset + len(data))
             self._note(file, _Change(offset, before, size, data, after))
         return code
+
+    def admit(self, *, longer: bool) -> None:
+        """Let a log that was opened beside SQLite be written.
+
+        Args:
+            longer: Whether that makes it longer.
+
+        Raises:
+            OSError: The disk is unwritable, or full and the log gets longer.
+        """
+        if self._is_on(DiskFault.UNWRITABLE):
+            self.failed += 1
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        if longer and self._is_on(DiskFault.FULL):
+            self.failed += 1
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def truncate(self, file: WatchedFile, size: int) -> int:
         """Cut a file short, unless the disk is unwritable."""

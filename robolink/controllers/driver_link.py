@@ -300,7 +300,10 @@ class DriverLink:
                     except UnclearAnswerError as error:
                         ledger.answered(marker)
                         unclear = error
-                    found = command.read()
+                    try:
+                        found = command.read()
+                    except RejectedError as error:  # to show a value undoes no write
+                        raise markers.unproved(command.request, error) from error
                 ledger.proved(marker, found)
                 markers.clear(marker, *command.entries(marker, found))
             finally:

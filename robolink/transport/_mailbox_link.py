@@ -3,7 +3,7 @@
 Source: docs/reference/rules.md 11; docs/reference/mailbox.md.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, Protocol
 
 from robolink.timing import Clock
@@ -76,8 +76,14 @@ class MailboxLink(Protocol):
         0 where the line is too fast to count: on a network, and inside this process.
         """
 
-    def write_command(self, words: Sequence[int]) -> None:
-        """Write the 64 words of the command block in one piece."""
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
+        """Write the 64 words of the command block in one piece.
+
+        Args:
+            words: The block.
+            admit: Asked directly before the block leaves, after all that a link sends ahead of it.
+                What it raises is raised, the block is not sent, and the link stays open.
+        """
 
     def read_head(self) -> MailboxHead:
         """Return the beginning of the response block, as fresh as possible."""

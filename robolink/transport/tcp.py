@@ -190,7 +190,8 @@ def _connect_error(error: OSError, url: LinkUrl, timeout_s: float) -> ConnectErr
         what = tr("{identity} refuses connections.", identity=url.identity)
         remedy = tr(
             "The machine is there; nothing listens on this port. Check the port number, and "
-            "that remote control, or the Modbus server, is switched on."
+            "that {server} is switched on.",
+            server=_server(url.medium),
         )
     elif isinstance(error, TimeoutError):
         what = tr(
@@ -210,6 +211,15 @@ def _connect_error(error: OSError, url: LinkUrl, timeout_s: float) -> ConnectErr
         )
         remedy = tr("Check the address, the port and this computer's network settings.")
     return ConnectError(what, remedy=remedy, controller=url.identity)
+
+
+def _server(medium: str) -> str:
+    """Return what answers at such a URL, as its maker calls it."""
+    if medium == "opcua":
+        return tr("the OPC UA server")
+    if medium.startswith("modbus"):
+        return tr("the Modbus server")
+    return tr("remote control")
 
 
 _SLICE_S = 0.05

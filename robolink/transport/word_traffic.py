@@ -68,10 +68,14 @@ class WordTraffic(MailboxLinkAround):
         super().__init__(inner)
         self._traffic = traffic or Traffic(inner.identity, inner.clock)
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
-        self._sent("write command", words)
-        self._inner.write_command(words)
+
+        def told() -> None:
+            admit()
+            self._sent("write command", words)
+
+        self._inner.write_command(words, told)
 
     def read_head(self) -> MailboxHead:
         """See :meth:`robolink.transport.MailboxLink.read_head`."""

@@ -17,7 +17,7 @@ from robolink.controllers.preserving import Preserver
 from robolink.controllers.resolving import MarkerResolver, examine_write
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import ToolWrite
-from robolink.errors import RejectedError, RemoteProtocolError
+from robolink.errors import RejectedError
 from robolink.messages import known_names, tr
 from robolink.model import (
     PROOFS,
@@ -250,15 +250,9 @@ class _RegisterWrite(ToolWrite):
 
         Registers have no proof of their word order, and numbers in another order may be those of
         a tool (docs/reference/faults.md F33): so the probe is compared behind them.
-
-        Raises:
-            RemoteProtocolError: The PLC refuses to show it; that undoes no write.
         """
-        try:
-            stored = self._slots.read(self._slot)
-            self._plc.require_probe()
-        except RejectedError as error:
-            raise RemoteProtocolError(error.what, remedy=error.remedy) from error
+        stored = self._slots.read(self._slot)
+        self._plc.require_probe()
         return stored
 
 

@@ -72,6 +72,17 @@ def is_own(command: Command, now: Response) -> bool:
     )
 
 
+def is_in_its_place(command: Command, before: Response, now: Response) -> bool:
+    """Whether a snapshot shows that the PLC accepted something else in place of this command.
+
+    An earlier command of the same client is not in its place: where nobody could read its
+    acknowledgement, that may come as late as between the look before this command and its block.
+    """
+    if (now.ack_head, now.ack_owner) == (before.ack_head, before.ack_owner):
+        return False
+    return now.ack_owner != command.owner or now.ack_head == command.sequence
+
+
 def came_too_early(command: Command, before: Response, now: Response) -> bool:
     """Whether the PLC held a command back, which it then never carries out.
 

@@ -4,8 +4,9 @@ Source: docs/reference/mailbox.md, "When a command counts".
 
 A command goes out with a number that is new, the owner's token, the epoch and the PLC start
 that was met. Its answer counts as ours only when owner, number and opcode are ours; an answer
-to somebody else in its place leaves it unknown. A block is written again in one case only: the
-PLC counts one more damaged block and has acknowledged nothing since. Never after a time-out.
+to somebody else in its place leaves it unknown. One to an earlier command of ours may still come
+before it. A block is written again in one case only: the PLC counts one more damaged block and has
+not acknowledged ours. Never after a time-out.
 
 Bringing the axis group behind a mailbox to rest, and knowing that it rests.
 
@@ -18,6 +19,7 @@ there the axes themselves are compared.
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from robolink import runtime
@@ -29,6 +31,7 @@ from robolink.controllers.softmotion.answers import (
     command_ended_early,
     describe,
     has_taken,
+    is_in_its_place,
     is_own,
     motion_failure,
     refused,
@@ -322,19 +325,27 @@ class CommandSender:
             before = self._allowed(draft, require)
             command = self._addressed(draft, before)
             words = self._encode(command)
-            if ride and self._wire.interrupted:
-                raise KeyboardInterrupt  # held back until here: no movement starts after it
             if ride:
                 self._wire.motions.begin(command.sequence)
             with in_doubt():
-                return command, self._accepted(command, before, words)
+                return command, self._accepted(command, before, words, ride=ride)
 
-    def _accepted(self, command: Command, before: Response, words: Words) -> Response:
+    def _admit(self, command: Command, *, ride: bool) -> None:
+        """Refuse a block after a stop, and a movement after a Ctrl-C that is held back."""
+        self._wire.latch.admit(command_class_of(command), describe(command))
+        if ride and self._wire.interrupted:
+            self._wire.motions.forget(command.sequence)
+            raise KeyboardInterrupt
+
+    def _accepted(
+        self, command: Command, before: Response, words: Words, *, ride: bool
+    ) -> Response:
         """Write a block, and return the snapshot that acknowledges it."""
+        admit = partial(self._admit, command, ride=ride)
         for _ in range(_WRITES):
             try:
-                self._wire.latch.admit(command_class_of(command), describe(command))
-                self._wire.write(words)
+                admit()  # before an error of the link can hide a stop; again as the block leaves
+                self._wire.write(words, admit)
             except (RejectedError, StoppedError):
                 self._wire.motions.forget(command.sequence)
                 raise
@@ -399,7 +410,7 @@ class CommandSender:
                 return now, True
             if came_too_early(command, before, now):
                 raise refused(command, now, ErrorClass.BUSY)
-            if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
+            if is_in_its_place(command, before, now):
                 raise self._wire.ended(self._overtaken(command, now))
             if now.rejected != before.rejected:
                 return now, False

@@ -349,8 +349,9 @@ class Snapshots:
     ) -> T:
         cause = ""
         for _ in range(_READS):
+            words = read()
             try:
-                return decode(read())
+                return decode(words)
             except BlockError as error:
                 cause = str(error)
                 if error.fault not in PASSING:

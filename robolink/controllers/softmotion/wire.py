@@ -239,20 +239,28 @@ class MailboxWire:
         """
         return self._ask(self._link.read_device)
 
-    def write(self, words: Sequence[int]) -> None:
+    def write(self, words: Sequence[int], admit: Callable[[], None]) -> None:
         """Write the command block, once.
+
+        Args:
+            words: The block.
+            admit: Raises where it may not leave; asked when nothing else is still to be sent.
 
         Raises:
             RejectedError: The link's far end refused to take it.
             TransportError, RemoteProtocolError: The session is over; it may have arrived.
         """
+
+        def admitted() -> None:
+            admit()
+            self.exchanges += 1  # one that was held back is none, so that no outcome hangs on it
+            self.commands += 1
+
         self._require_alive()
         with self._turn(), self._gate:
-            self.exchanges += 1
-            self.commands += 1
             sent_ns = self.clock.now_ns()
             try:
-                self._link.write_command(words)
+                self._link.write_command(words, admitted)
                 self._note_answer(sent_ns)
                 return
             except (TransportError, RemoteProtocolError) as error:
@@ -378,17 +386,30 @@ class MailboxWire:
         busy = self.motions.unfinished
         now_ns = self.clock.now_ns()
         if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy, ahead=ahead):
-            try:
-                self._asked(lambda: self._link.beat(self.next_beat()))
-            except RejectedError:
-                if not self.latch.closed:
-                    raise
+            self._asked(self._beat_now)
+
+    def _beat_now(self) -> None:
+        try:
+            self._link.beat(self.next_beat())
+        except RejectedError:
+            if not self.latch.closed:
+                raise
 
     def _asked(self, exchange: Callable[[], T], *, awaited: bool = True) -> T:
-        """Do an exchange up to three times; only once more when its whole deadline has passed."""
+        """Do an exchange until it is done, refused three times, or lost three times.
+
+        It is done only once more when its whole deadline has passed.
+
+        A look or a beat that is refused says of no command that it was not done. So once one was
+        sent, it is told as an answer that makes no sense, which leaves open what became of that.
+        The session goes on, for a stop: a refusal is an answer, and what is lost closes the link,
+        or a serial line finds its place again before it takes another answer. Three that are lost,
+        or one behind which the link is closed, end the session.
+        """
         lost: list[RobolinkError] = []
+        refused: list[RejectedError] = []
         deadline = Deadline.after(self.clock, self.timeout_s)
-        while len(lost) < _READS:
+        while max(len(lost), len(refused)) < _READS:
             last = bool(lost) and deadline.expired
             try:
                 with self._gate:
@@ -403,7 +424,15 @@ class MailboxWire:
                 silent = last and isinstance(error, TransportTimeoutError)
                 if silent or isinstance(error, TransportClosedError):
                     break  # nobody answers, or the link can no longer be used
-        raise self._over(lost[0])
+            except RejectedError as error:
+                if not self.commands:
+                    raise
+                refused.append(error)
+        if len(refused) < _READS:
+            raise self._over(lost[0])
+        first = refused[0]
+        what, remedy, request = first.what, first.remedy, first.request
+        raise RemoteProtocolError(what, remedy=remedy, request=request) from first
 
     def _note_answer(self, sent_ns: int, *, awaited: bool = True) -> None:
         """Note an answer; the one that shows the end of a movement is waited for, and half another.

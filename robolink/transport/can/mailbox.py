@@ -147,8 +147,9 @@ class CanopenMailboxLink:
                 controller=self.identity,
             ) from error
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one DOMAIN download."""
+        admit()
         data = struct.pack(f"<{COMMAND_WORDS}H", *require_words(words, COMMAND_WORDS))
         with self._exchange() as deadline:
             self._download(COMMAND_OBJECT, 0, data, deadline)

@@ -124,8 +124,9 @@ class ModbusMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.whole_look_s`."""
         return self._client.read_takes_s(RESPONSE_WORDS) + self._client.write_takes_s(1)
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one function 16."""
+        admit()
         self._client.write_registers(self._places.command, require_words(words, COMMAND_WORDS))
 
     def read_head(self) -> MailboxHead:

@@ -47,6 +47,8 @@ _RENEWED_AFTER: Final = 0.75
 _NS_PER_MS: Final = 1_000_000
 
 _KINDS: Final = frozenset({b"ACK", b"ERR", b"MSG", b"OPN"})
+_ABORTED: Final = b"A"
+"""Fourth byte of a chunk after which no more of its message comes (OPC 10000-6, 6.7.3)."""
 _FAULT: Final = ua.FourByteNodeId(ua.ObjectIds.ServiceFault_Encoding_DefaultBinary)
 
 _AnswerT = TypeVar("_AnswerT")
@@ -194,8 +196,11 @@ class SecureChannel:
                 )
             except Exception as error:  # what a parser raises on bytes from anywhere
                 raise errors.unintelligible(self._identity, error, raw[:256]) from error
-            if message is None:
-                continue  # one chunk of several
+            if message is None:  # one chunk of several, or the one that ends them without an answer
+                if raw[3:4] == _ABORTED:
+                    cause = tr("it gave up its answer ({request})", request=told)
+                    raise errors.unintelligible(self._identity, cause, raw[:256])
+                continue
             if message.request_id() != self._request_id:
                 raise errors.unintelligible(self._identity, told, raw[:256])
             return BoundedBuffer(bytes(message.body()))

@@ -162,16 +162,31 @@ class OpcuaClient:
         """Write the whole value of one node, in the node's own type, once."""
         self.write_in_turn([(node, value)])
 
-    def write_in_turn(self, values: Sequence[tuple[str, object]], *, stop: bool = False) -> None:
+    def write_in_turn(
+        self,
+        values: Sequence[tuple[str, object]],
+        *,
+        stop: bool = False,
+        admit: Callable[[], None] = lambda: None,
+    ) -> None:
         """Write whole values, one request after another, within one deadline.
 
         Args:
             values: Nodes and their values. One that fails ends it: none after it is written.
             stop: Whether they stop a robot: a connection for reading only does that too.
+            admit: Asked before the last of them. If it raises, that one is not written, and the
+                connection stays: it has to carry a stop.
         """
         requests = [self._write_request(node, value, stop=stop) for node, value in values]
+        objection: BaseException | None = None
         with self._exchange() as deadline:
             for (node, value), (facts, request) in zip(values, requests, strict=True):
+                if request is requests[-1][1]:
+                    try:
+                        admit()
+                    except BaseException as error:
+                        objection = error
+                        break
                 told = errors.write_of(node)
                 self._tell(self._traffic.sent, facts, value, told)
                 (status,) = self._space.ask(
@@ -179,6 +194,8 @@ class OpcuaClient:
                 )
                 if not status.is_good():
                     raise errors.refused_node(self.identity, node, status_of(status), write=True)
+        if objection is not None:
+            raise objection
 
     def _write_request(
         self, node: str, value: object, *, stop: bool

@@ -137,7 +137,7 @@ class OpcuaMailboxLink:
         """The client's, and which of a server's mailboxes when it is not the usual one."""
         return self._client.place + self._which
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one array.
 
         The program looks for the heartbeat in its own variable only. It goes there before the
@@ -147,7 +147,7 @@ class OpcuaMailboxLink:
         command = require_words(words, COMMAND_WORDS)
         stop = is_stop(command)
         beat = [] if stop else [(self._nodes.heartbeat, command[HEARTBEAT_WORD])]
-        self._client.write_in_turn([*beat, (self._nodes.command, command)], stop=stop)
+        self._client.write_in_turn([*beat, (self._nodes.command, command)], stop=stop, admit=admit)
 
     def read_head(self) -> MailboxHead:
         """See :meth:`robolink.transport.MailboxLink.read_head`; the whole response."""

@@ -5,6 +5,7 @@ PLC itself shows. Its names and dates are told; only its dates are held against 
 """
 
 import hashlib
+import warnings
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Final
@@ -158,8 +159,7 @@ def read_server_certificate(der: bytes, identity: str) -> OfferedCertificate:
     """
     try:
         found = x509.load_der_x509_certificate(der)
-        common = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-        called = str(common[0].value) if common else ""
+        called = _common_name(found)
         try:
             names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         except x509.ExtensionNotFound:
@@ -183,6 +183,17 @@ def read_server_certificate(der: bytes, identity: str) -> OfferedCertificate:
             remedy=tr("Check that this is the port of its OPC UA server, usually 4840."),
             raw=der[:256],
         ) from error
+
+
+def _common_name(certificate: x509.Certificate) -> str:
+    """Return whom it is made out to; empty where it does not say.
+
+    Eclipse Milo leaves the country empty, of which cryptography would warn the user each time.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Attribute's length", UserWarning)
+        common = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(common[0].value) if common else ""
 
 
 def _plain(text: str) -> str:

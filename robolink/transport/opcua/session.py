@@ -315,7 +315,7 @@ def _policy(identity: str, security: OpcuaSecurity, certificate: bytes) -> Secur
     made: SecurityPolicy = wanted(
         uacrypto.x509_from_der(certificate),
         uacrypto.x509_from_der(security.own_certificate),
-        load_pem_private_key(security.own_key, None),
+        load_pem_private_key(security.own_key, None, unsafe_skip_rsa_key_validation=True),
         ua.MessageSecurityMode.SignAndEncrypt,
     )
     return made

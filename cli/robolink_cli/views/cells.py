@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from robolink.calibration_run import clearance_too_small
 from robolink.config import (
     USUAL_CHANGE_MM,
     Cell,
@@ -72,6 +71,8 @@ def _refusals(method: AnyMethod, settings: "CellSettings") -> Iterator[Problem]:
     clearance_mm = parameters.clearance_mm
     largest_mm = USUAL_CHANGE_MM if limit_mm is None else limit_mm
     if clearance_mm < largest_mm:
+        from robolink.calibration_run import clearance_too_small  # with numpy; a listing needs none
+
         where = "clearance_mm" if "clearance_mm" in said else "max_change_mm"
         yield Problem(where, clearance_too_small(clearance_mm, largest_mm))
 

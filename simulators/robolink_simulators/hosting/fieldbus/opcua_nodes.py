@@ -15,7 +15,6 @@ from asyncua.server.address_space import (
     NodeData,
     NodeManagementService,
 )
-from asyncua.server.standard_address_space import standard_address_space
 from asyncua.ua.ua_binary import extensionobject_to_binary, nodeid_from_binary, pack_uatype
 from asyncua.ua.ua_binary import unpack_uatype as unpacked
 
@@ -45,10 +44,13 @@ _VALUE: Final = ua.AttributeIds.Value
 
 @cache
 def _standard_nodes() -> Mapping[ua.NodeId, NodeData]:
-    """Return the 6,000 nodes of the standard: 0.8 s of work, once a process.
+    """Return the 6,000 nodes of the standard: once a process, by nine megabytes of source.
 
-    Without a pause the collector would take as long again: all that is made here stays.
+    Whoever serves nothing does not import those. Without a pause the collector would take as long
+    again as all that is made here, which stays.
     """
+    from asyncua.server.standard_address_space import standard_address_space
+
     space = AddressSpace()
     collected = gc.isenabled()
     gc.disable()

@@ -79,8 +79,9 @@ class InProcessMailboxLink:
         """0: nothing is carried anywhere."""
         return 0.0
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
+        admit()
         self._exchange(lambda now_ns: self._simulator.write(0, words, now_ns))
 
     def read_head(self) -> MailboxHead:

@@ -16,6 +16,7 @@ JUDGES := $(VENV)/judges
 API_JUDGE := $(VENV)/schemathesis
 TYPE_JUDGE := $(VENV)/pyright
 OPCUA_JUDGE := $(VENV)/node-opcua/node_modules/node-opcua
+MILO_JUDGE := $(VENV)/milo
 WHEELHOUSE := wheelhouse
 POT := robolink/locale/robolink.pot
 
@@ -64,7 +65,7 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F87, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) $(TYPE_JUDGE) $(OPCUA_JUDGE) ## Let foreign programs judge buses, PLC program, control API and examples.
+peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) $(TYPE_JUDGE) $(OPCUA_JUDGE) $(MILO_JUDGE) ## Let foreign programs judge buses, PLC program, control API and examples.
 	@{ command -v mbpoll && command -v tshark && command -v node && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
@@ -90,6 +91,12 @@ $(TYPE_JUDGE): $(VENV)/.installed-dev
 $(OPCUA_JUDGE): $(VENV)/.installed-dev
 	mkdir -p $(VENV)/node-opcua
 	npm install --silent --no-fund --no-audit --prefix $(VENV)/node-opcua node-opcua@2.186.4 && touch $@ || true
+
+# Eclipse Milo in Java; without it, or a JDK, it is left out, and the run says so. MILO_CLASSPATH=a.jar:b.jar
+# names its archives where they are here already; Maven takes minutes to see that there is no network.
+$(MILO_JUDGE): tests/peers/milo/pom.xml
+	[ -n "$$MILO_CLASSPATH" ] || timeout 300 mvn --quiet --batch-mode --file $< \
+		dependency:copy-dependencies -DoutputDirectory=$(abspath $@) || true
 
 # Debian's chromium, or what `chromium` on PATH is. With NEED_CHROMIUM=1 a test that cannot run fails.
 .PHONY: panel

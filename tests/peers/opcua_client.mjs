@@ -2,7 +2,7 @@
 //
 //     {"do": "browse", "path": ["DeviceSet", "Device"]}       names of the children
 //     {"do": "read", "nodes": ["ns=4;s=..."]}                 status, type and value of each
-//     {"do": "write", "node": "...", "type": "Double", "value": [1, 2], "range": "0:1"?}
+//     {"do": "write", "node": "...", "type": "Double", "value": [1, 2], "range": "0:1"?, "stamped": true?}
 //     {"do": "watch", "node": "..."}      the values that a subscription brings, as they come
 //
 //     node opcua_client.mjs NODE_OPCUA FOLDER URL POLICY [USER PASSWORD]
@@ -50,13 +50,16 @@ const acts = {
       value: plain(one.value.value),
     }));
   },
-  async write({ node, type, value, range }) {
+  async write({ node, type, value, range, stamped }) {
     const arrayType = Array.isArray(value) ? ua.VariantArrayType.Array : ua.VariantArrayType.Scalar;
     const status = await session.write({
       nodeId: node,
       attributeId: ua.AttributeIds.Value,
       ...(range && { indexRange: new ua.NumericRange(range) }),
-      value: { value: new ua.Variant({ dataType: ua.DataType[type], arrayType, value }) },
+      value: {
+        value: new ua.Variant({ dataType: ua.DataType[type], arrayType, value }),
+        ...(stamped && { sourceTimestamp: new Date() }),
+      },
     });
     return { status: status.name };
   },

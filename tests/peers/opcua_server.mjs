@@ -3,7 +3,7 @@
 // of a machine as arrays, a structure and signals of its own. What is written it prints, a JSON object
 // a line; a line {"set": NAME, "value": ...} on its input changes a variable of the machine.
 //
-//     node opcua_server.mjs NODE_OPCUA FOLDER MODBUS_PORT [USER PASSWORD] [--refuse-certificates]
+//     node opcua_server.mjs NODE_OPCUA FOLDER MODBUS_PORT [USER PASSWORD] [--refuse-certificates] [--port=N]
 import { createInterface } from "node:readline";
 import { createRequire } from "node:module";
 import { once } from "node:events";
@@ -81,7 +81,7 @@ writeFileSync(
 
 const server = new ua.OPCUAServer({
   nodeset_filename: [ua.nodesets.standard, `${folder}/types.xml`],
-  port: 0,
+  port: Number(rest.find((word) => word.startsWith("--port="))?.slice("--port=".length) ?? 0),
   host: "127.0.0.1",
   hostname: "127.0.0.1",
   allowAnonymous: user === undefined,

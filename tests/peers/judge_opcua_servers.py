@@ -1,26 +1,34 @@
-"""node-opcua judges OPC UA: our links at its server, and its client at our simulators.
+"""Our links and drivers over OPC UA at servers of others: node-opcua and Eclipse Milo.
 
-Its server keeps the mailbox of a simulated PLC, which it reaches over Modbus TCP, so that whole
-tool writes and movements pass through it.
+Each of them keeps the mailbox of a simulated PLC, which it reaches over Modbus TCP, so that whole
+tool writes and movements pass through it, and tools of a machine of its own.
 """
 
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import pytest
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
-from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink import ToolOffset
-from robolink.errors import ConfigError, ConnectError, LoginRefusedError, RejectedError
+from robolink.errors import (
+    ConfigError,
+    ConnectError,
+    LoginRefusedError,
+    NotReadyError,
+    RejectedError,
+    ToolChangedError,
+    TransportError,
+)
 from robolink.model import MotionProfile, Path, Secret, WorkBox
 from robolink.protocols.mailbox import PROBE, Opcode, decode_response
+from robolink.testing import confirm_whole_map
 from robolink.transport import open_mailbox_link, parse_url
 from robolink.transport.opcua.opening import open_opcua
-from tests.peers import _node_opcua
-from tests.peers._node_opcua import NodeClient, NodeLink, NodeServer
+from tests.peers import _opcua_stacks
+from tests.peers._opcua_stacks import STACKS, StackServer
 from tests.unit._mailbox_client import MailboxClient
 
 PLAIN = "security=none&write_unsecured=yes"
@@ -37,10 +45,16 @@ def plc():
         yield simulator, parse_url(host.url).port
 
 
+@pytest.fixture(scope="module", params=STACKS)
+def stack(request):
+    """Whose server."""
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def server(plc, tmp_path_factory):
-    """node-opcua's server before that PLC; it takes ten seconds to start."""
-    with NodeServer(tmp_path_factory.mktemp("server"), plc[1]) as server:
+def server(stack, plc, tmp_path_factory):
+    """A server before that PLC; it takes ten seconds to start."""
+    with StackServer(stack, tmp_path_factory.mktemp("server"), plc[1]) as server:
         yield server
 
 
@@ -64,11 +78,17 @@ def client(server):
         yield client
 
 
-def test_without_node_opcua_this_judge_fails(monkeypatch, tmp_path):
-    monkeypatch.setattr(_node_opcua, "MODULES", tmp_path)
+@pytest.mark.parametrize(
+    ("stack", "outcome"), [("node-opcua", pytest.fail.Exception), ("Milo", pytest.skip.Exception)]
+)
+def test_a_stack_that_is_not_here_is_told(monkeypatch, tmp_path, stack, outcome):
+    monkeypatch.setattr(_opcua_stacks, "MODULES", tmp_path)
+    monkeypatch.setattr(_opcua_stacks, "ARCHIVES", tmp_path)
+    monkeypatch.delenv("MILO_CLASSPATH", raising=False)
     with pytest.raises((pytest.fail.Exception, pytest.skip.Exception)) as told:
-        NodeServer(tmp_path, 0)
-    assert isinstance(told.value, pytest.fail.Exception)
+        StackServer(stack, tmp_path, 0)
+    assert isinstance(told.value, outcome)
+    assert "make peers fetches it" in str(told.value)
 
 
 def test_each_type_is_read_as_what_it_is(client):
@@ -136,13 +156,96 @@ def test_the_driver_writes_a_tool_and_moves(mailbox, plc):
     assert plc[0].plc.memory.slot(SLOT).tool[:4] == (NEW.x_mm, NEW.y_mm, NEW.z_mm, NEW.u_deg)
 
 
+MAP = f"""\
+schema = "robolink/plc-map/1"
+name = "judge"
+[numbers]
+root = "{VARIABLE}.GVL."
+type = "LREAL"
+[[tools]]
+number = 1
+node = "aTool1"
+length = 6
+x = {{ element = 0 }}
+y = {{ element = 1 }}
+z = {{ element = 2 }}
+u = {{ element = 3 }}
+[cycle_counter]
+node = "uiCycle"
+[permit]
+node = "xPermit"
+[commit]
+kind = "none"
+settle_s = 0.05
+"""
+FIRST = ToolOffset(12.0, -3.5, -20.0, 15.0)
+
+
+@pytest.fixture
+def mapped(tmp_path):
+    """Returns the URL of a machine with a map, at a port."""
+    path = tmp_path / "judge.toml"
+    path.write_text(MAP)
+    return lambda port: f"plc+opcua://127.0.0.1:{port}?map={path}&{PLAIN}"
+
+
+def test_the_driver_of_a_map_writes_a_tool_once(mapped, server):
+    with robolink.connect(mapped(server.port)) as controller:
+        confirm_whole_map(controller)
+        assert controller.tools.same(controller.tools.read(1), FIRST)
+        receipt = controller.tools.write(1, NEW, expected=FIRST)
+        assert controller.tools.same(receipt.read_back, NEW)
+        with pytest.raises(ToolChangedError):
+            controller.tools.write(1, FIRST, expected=FIRST)
+    assert server.wrote("aTool1") == [[NEW.x_mm, NEW.y_mm, NEW.z_mm, NEW.u_deg, 0, 0]]
+
+
+def test_the_driver_of_a_map_writes_nothing_without_the_machines_permit(mapped, server):
+    server.tell(set="xPermit", value=False)
+    with robolink.connect(mapped(server.port)) as controller:
+        confirm_whole_map(controller)
+        with pytest.raises(NotReadyError, match="xPermit"):
+            controller.tools.write(1, NEW, expected=FIRST)
+    assert server.wrote("aTool1") == []
+
+
+def test_what_is_written_after_the_server_has_restarted_is_not_sent(stack, plc, mapped, tmp_path):
+    with ExitStack() as gone:
+        first = gone.enter_context(StackServer(stack, tmp_path, plc[1]))
+        controller = gone.enter_context(robolink.connect(mapped(first.port)))
+        confirm_whole_map(controller)
+        assert controller.tools.same(controller.tools.read(1), FIRST)
+        first.kill()
+        with StackServer(stack, tmp_path, plc[1], f"--port={first.port}") as again:
+            with pytest.raises(TransportError):
+                controller.tools.write(1, NEW, expected=FIRST)
+            assert again.wrote("aTool1") == []
+            with robolink.connect(mapped(first.port)) as renewed:
+                renewed.tools.write(1, NEW, expected=FIRST)
+            assert len(again.wrote("aTool1")) == 1
+
+
+def test_a_structure_is_read_by_its_definition_or_refused_by_name(stack, client, server):
+    node = f"{VARIABLE}.GVL.stTool"
+    if stack == "Milo":  # has no attribute DataTypeDefinition
+        with pytest.raises(RejectedError, match=r"does not define the structure of .*stTool"):
+            client.read([node])
+        with pytest.raises(ConfigError, match="stTool"):
+            client.write(node, {"rX": 1.0})
+        assert server.wrote("stTool") == []
+        assert client.read([f"{VARIABLE}.GVL.xPermit"]) == (True,)
+        return
+    assert client.read([node]) == ({"rX": 1.5, "rY": -2.5, "rZ": 30.0, "rU": 0.0},)
+
+
 USER, PASSWORD = "cell 3", "correct horse battery"
 
 
 @pytest.fixture(scope="module")
-def guarded(plc, tmp_path_factory):
+def guarded(stack, plc, tmp_path_factory):
     """Its server with one user, behind the same PLC."""
-    with NodeServer(tmp_path_factory.mktemp("guarded"), plc[1], USER, PASSWORD) as server:
+    folder = tmp_path_factory.mktemp("guarded")
+    with StackServer(stack, folder, plc[1], USER, PASSWORD) as server:
         yield server
 
 
@@ -179,92 +282,8 @@ def test_who_may_not_is_told_why(guarded, options, password, error, why):
         open_mailbox_link(pinned(guarded, **options), password=secret)
 
 
-def test_a_server_that_does_not_trust_this_computer_is_told_by_name(plc, tmp_path):
-    with NodeServer(tmp_path, plc[1], USER, PASSWORD, "--refuse-certificates") as server:
+def test_a_server_that_does_not_trust_this_computer_is_told_by_name(stack, plc, tmp_path):
+    with StackServer(stack, tmp_path, plc[1], USER, PASSWORD, "--refuse-certificates") as server:
         with pytest.raises((ConnectError, RejectedError, LoginRefusedError)) as told:
             open_mailbox_link(pinned(server), password=Secret(PASSWORD))
     assert "certificate" in f"{told.value.what} {told.value.remedy}"
-
-
-@pytest.fixture(scope="module")
-def pki(tmp_path_factory):
-    """The certificates of its client."""
-    return tmp_path_factory.mktemp("client")
-
-
-@pytest.fixture
-def ours():
-    """Our simulated PLC over OPC UA, and its URL."""
-    simulator = SoftMotionSimulator(seed=5)
-    with served(simulator, "opcua") as url:
-        yield simulator, url
-
-
-def endpoint(url):
-    parsed = parse_url(url)
-    return f"opc.tcp://{parsed.host}:{parsed.port}"
-
-
-def tree_of(client):
-    """Browse to the mailbox, as a person with a browser does; returns the root of its node ids."""
-    path = ["DeviceSet"]
-    (device,) = client.do("browse", path=path)["children"]
-    path += [device, "Resources", "Application", "GlobalVars", "RL_Symbols"]
-    found = client.do("browse", path=path)
-    assert set(found["children"]) >= {"command", "response", "slots", "heartbeat"}
-    return f"ns=4;s=|var|{device}.Application.RL_Symbols"
-
-
-@pytest.mark.parametrize("policy", ["None", "Basic256Sha256", "Aes256_Sha256_RsaPss"])
-def test_its_client_writes_a_tool_that_robolink_reads_back(ours, pki, policy):
-    _simulator, url = ours
-    with NodeClient(pki, endpoint(url), policy) as node:
-        tree = tree_of(node)
-        client = MailboxClient(NodeLink(node, tree))
-        client.take()
-        pose = (NEW.x_mm, NEW.y_mm, NEW.z_mm, NEW.u_deg, 0.0, 0.0)
-        client.done(Opcode.WRITE_TOOL, SLOT, pose=pose, name="node-opcua")
-        client.done(Opcode.OWNERSHIP, 0)
-    with robolink.connect(url) as controller:
-        assert controller.tools.same(controller.tools.read(SLOT), NEW)
-
-
-def test_its_client_reads_every_node_with_its_type_and_length(ours, pki):
-    _simulator, url = ours
-    with NodeClient(pki, endpoint(url)) as node:
-        tree = tree_of(node)
-        names = ("command", "response", "slots", "heartbeat")
-        got = node.do("read", nodes=[f"{tree}.{name}" for name in names])
-    assert {(one["status"], one["type"]) for one in got} == {("Good", "UInt16")}
-    assert [len(one["value"]) for one in got[:3]] == [64, 114, 544]
-    assert decode_response(tuple(got[1]["value"][1:-1])).probe == PROBE
-
-
-def test_its_client_is_told_of_a_change_that_it_subscribed_to(ours, pki):
-    _simulator, url = ours
-    with NodeClient(pki, endpoint(url)) as node:
-        tree = tree_of(node)
-        node.do("watch", node=f"{tree}.response")
-        first = node.next("value")
-        later = node.next("value")
-        assert first != later, "the PLC's heartbeat counts"
-
-
-@pytest.mark.parametrize(
-    ("name", "given", "status"),
-    [
-        ("command", {"type": "UInt16", "value": [1] * 4, "range": "0:3"}, "BadIndexRangeInvalid"),
-        ("command", {"type": "UInt16", "value": [1] * 63}, "BadTypeMismatch"),
-        ("command", {"type": "Int16", "value": [1] * 64}, "BadTypeMismatch"),
-        ("response", {"type": "UInt16", "value": [1] * 114}, "BadNotWritable"),
-        ("heartbeat", {"type": "UInt16", "value": [1]}, "BadTypeMismatch"),
-    ],
-    ids=["a part", "too short", "another type", "read only", "an array"],
-)
-def test_our_simulator_refuses_its_client_what_a_plc_would(ours, pki, name, given, status):
-    _simulator, url = ours
-    with NodeClient(pki, endpoint(url)) as node:
-        tree = tree_of(node)
-        before = node.do("read", nodes=[f"{tree}.command"])[0]["value"]
-        assert node.do("write", node=f"{tree}.{name}", **given) == {"status": status}
-        assert node.do("read", nodes=[f"{tree}.command"])[0]["value"] == before

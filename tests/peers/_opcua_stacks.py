@@ -1,13 +1,16 @@
-"""node-opcua, in a process of its own, as server and as client."""
+"""OPC UA stacks of others, each in a process of its own, as server and as client."""
 
 import json
+import os
 import queue
 import shutil
 import subprocess
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import pytest
@@ -17,19 +20,62 @@ from tests._patience import PATIENCE_S
 
 ROOT: Final = Path(__file__).parents[2]
 MODULES: Final = ROOT / ".venv/node-opcua"
+ARCHIVES: Final = ROOT / ".venv/milo"
 _HERE: Final = Path(__file__).parent
+
+
+def _node_opcua(role: str) -> list[str]:
+    node = shutil.which("node")
+    if node is None or not (MODULES / "node_modules/node-opcua").exists():
+        pytest.fail("node-opcua is not here: make peers fetches it with npm", pytrace=False)
+    return [node, str(_HERE / f"opcua_{role}.mjs"), str(MODULES)]
+
+
+def _milo(role: str) -> list[str]:
+    classpath = os.environ.get("MILO_CLASSPATH") or os.pathsep.join(
+        map(str, sorted(ARCHIVES.glob("*.jar")))
+    )
+    java, javac = shutil.which("java"), shutil.which("javac")
+    if not (java and javac and classpath):
+        pytest.skip(
+            "Milo is not here: make peers fetches it with Maven, or MILO_CLASSPATH names its "
+            "archives; it takes a JDK, 11 or later"
+        )
+    classes = _compiled(javac, classpath).name
+    command = [java, "-XX:TieredStopAtLevel=1", "-cp", os.pathsep.join([classes, classpath])]
+    return [*command, f"Milo{role.capitalize()}"]
+
+
+@cache
+def _compiled(javac: str, classpath: str) -> TemporaryDirectory[str]:
+    """Compile our programs against Milo; the folder goes with this process."""
+    folder = TemporaryDirectory(prefix="milo-")
+    sources = map(str, sorted((_HERE / "milo").glob("*.java")))
+    command = [javac, "--release", "11", "-nowarn", "-cp", classpath, "-d", folder.name, *sources]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.fail(f"javac:\n{done.stderr}", pytrace=False)
+    return folder
+
+
+STACKS: Final[Mapping[str, Callable[[str], list[str]]]] = {
+    "node-opcua": _node_opcua,
+    "Milo": _milo,
+}
+"""Returns the command of a stack as ``server`` or ``client``; fails or skips where it is not here.
+"""
 
 
 class Told:
     """A program that prints a JSON object a line, and takes them."""
 
-    def __init__(self, script: str, *arguments: object) -> None:
-        node = shutil.which("node")
-        if node is None or not (MODULES / "node_modules/node-opcua").exists():
-            pytest.fail("node-opcua is not here: make peers fetches it with npm", pytrace=False)
-        command = [node, str(_HERE / script), str(MODULES), *map(str, arguments)]
+    def __init__(self, stack: str, role: str, *arguments: object) -> None:
+        command = [*STACKS[stack](role), *map(str, arguments)]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
         self._lines: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self.others: list[dict[str, Any]] = []
@@ -39,7 +85,7 @@ class Told:
     def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            if line.startswith("{"):  # node-opcua's own messages do not
+            if line.startswith("{"):  # messages of the stack itself do not
                 self._lines.put(json.loads(line))
         self._lines.put({"ended": True})
 
@@ -60,6 +106,11 @@ class Told:
         self._process.stdin.write(json.dumps(asked) + "\n")
         self._process.stdin.flush()
 
+    def kill(self) -> None:
+        """End it as a loss of power would."""
+        self._process.kill()
+        self._process.wait(PATIENCE_S)
+
     def __enter__(self):
         return self
 
@@ -69,19 +120,28 @@ class Told:
             self._process.communicate(timeout=PATIENCE_S)
 
 
-class NodeServer(Told):
-    """The server: the mailbox of a simulated PLC that serves Modbus TCP, and tools of its own."""
+class StackServer(Told):
+    """The server: the mailbox of a simulated PLC that serves Modbus TCP, and tools of its own.
 
-    def __init__(self, folder: Path, modbus_port: int, *more: str) -> None:
-        super().__init__("opcua_server.mjs", folder, modbus_port, *more)
+    Args:
+        stack: One of :data:`STACKS`.
+        folder: For its files.
+        modbus_port: Of the simulated PLC.
+        more: Name and password of its only user; ``--refuse-certificates``, so that it trusts no
+            client; ``--port=N``.
+    """
+
+    def __init__(self, stack: str, folder: Path, modbus_port: int, *more: str) -> None:
+        super().__init__(stack, "server", folder, modbus_port, *more)
         listening = self.next("listening")
         self.port: int = listening["port"]
         self.sha256: str = listening["sha256"]
 
     def forget(self) -> None:
         """Put the first tool back, and drop what has been told so far."""
-        self.tell(set="aTool1", value=[12.0, -3.5, -20.0, 15.0, 0.0, 0.0])
-        self.next("set")
+        for name, value in (("aTool1", [12.0, -3.5, -20.0, 15.0, 0.0, 0.0]), ("xPermit", True)):
+            self.tell(set=name, value=value)
+            self.next("set")
         self.others.clear()
 
     def wrote(self, name: str) -> list[Any]:
@@ -91,11 +151,18 @@ class NodeServer(Told):
         return [told.get("value") for told in self.others if told.get("wrote") == name]
 
 
-class NodeClient(Told):
-    """The client, connected."""
+class StackClient(Told):
+    """The client, at a server: a stack, a folder, a URL, a policy, and name and password."""
 
-    def __init__(self, folder: Path, url: str, policy: str = "None", *user: str) -> None:
-        super().__init__("opcua_client.mjs", folder, url, policy, *user)
+    def __init__(
+        self, stack: str, folder: Path, url: str, policy: str = "None", *user: str
+    ) -> None:
+        super().__init__(stack, "client", folder, url, policy, *user)
+
+    def met(self) -> str:
+        """Return ``connected``, or the status code or words with which it was refused."""
+        told: str = self.next("connected", "refused")
+        return "connected" if told.startswith("opc.tcp") else told
 
     def do(self, act: str, **given: object) -> Any:
         """Let it act; returns the answer."""
@@ -103,10 +170,10 @@ class NodeClient(Told):
         return self.next("done", "failed")
 
 
-class NodeLink:
+class StackLink:
     """What :class:`tests.unit._mailbox_client.MailboxClient` needs of a link, by that client."""
 
-    def __init__(self, client: NodeClient, tree: str) -> None:
+    def __init__(self, client: StackClient, tree: str) -> None:
         self._client, self._tree = client, tree
         self.clock = SystemClock()
 

@@ -41,6 +41,7 @@ _PROGRAMS: Final = (
     "tests.contract._own_window",
     "benchmarks.work.asked_cells",
     "tests._program",
+    "tests.fleet._full_disk",
     "tests.fleet._killed_next",
 )
 _STARTS_OTHERS: Final = "panel"
@@ -292,8 +293,11 @@ def _opened(before: Any, descriptor: int) -> io.TextIOWrapper:
 
 
 def _main(descriptor: int) -> None:
+    from robolink_cli.panel.stop import load_opcua
+
     gc.disable()  # imported objects are not garbage
     import_all()
+    load_opcua()  # which each panel's process of stops does too
     gc.freeze()
     gc.enable()
     gc.set_threshold(10_000, 10, 10)  # as in the tests; with it no simulator counts what is frozen

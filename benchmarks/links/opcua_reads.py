@@ -1,29 +1,35 @@
-"""A read over OPC UA through our client against one over Modbus: bare, and of a mailbox.
+"""A read over OPC UA against one over Modbus: bare, of a mailbox, and of a tool of a map.
 
 For the first two lines both servers hold values that stand still and share a process and, where
-there are two, a CPU of their own. The mailbox is read at the simulated PLC, over both links by our
-own clients. A read is timed alone; the figure is the median of all.
+there are two, a CPU of their own. Mailbox and tools are read at simulated PLCs, over both links by
+our own clients. A tool of a map is read twice over both, and over OPC UA the second time after a
+cycle of the PLC, which that line contains. A read is timed alone; the figure is the median of all.
 """
 
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from functools import partial
+from pathlib import Path
 from statistics import median
 from time import perf_counter_ns
 from typing import Final
 
 from pymodbus.client import ModbusTcpClient
+from robolink_simulators.testkit.operator import written_map, written_symbol_map
 
+import robolink
 from benchmarks.links.bare_servers import ARRAY, LREALS, WORDS
 from benchmarks.links.placing import answering, served_simulators
 from benchmarks.table import Amount, Figure
+from robolink.journal import memory_journal
 from robolink.transport import open_mailbox_link, parse_url
 from robolink.transport.opcua.opening import open_opcua
 
 READS: Final = 1_000
+TOOL_READS: Final = 20
 ROUNDS: Final = 7
-WARM_UP: Final = 100
 PLAIN_GOAL: Final = 2.5
 ENCRYPTED_GOAL: Final = 4.0
 _PLAIN: Final = "security=none&write_unsecured=yes"
@@ -48,6 +54,7 @@ def opcua_reads(cpu: int | None) -> Iterator[Figure]:
                 goal,
             )
     yield from _mailbox(cpu)
+    yield from _tool_of_a_map(cpu)
 
 
 def _mailbox(cpu: int | None) -> Iterator[Figure]:
@@ -66,24 +73,49 @@ def _mailbox(cpu: int | None) -> Iterator[Figure]:
         )
 
 
+def _tool_of_a_map(cpu: int | None) -> Iterator[Figure]:
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        reads = []
+        for medium, option, path in (
+            ("opcua-unsecured", "--opcua", written_symbol_map(folder)),
+            ("modbus-tcp", "--tcp", written_map(folder)),
+        ):
+            serving = ("plc", "--map", str(path), option, "127.0.0.1:0")
+            url = stack.enter_context(served_simulators(cpu, serving))["urls"][medium]
+            log = memory_journal(url).log(url)
+            controller = stack.enter_context(robolink.connect(url, outcomes=log))
+            reads.append(partial(controller.tools.read, 1))
+        over_opcua, over_modbus = reads
+        yield _compared(
+            "tool of a map over OPC UA, not encrypted",
+            over_opcua,
+            "a tool of a map over Modbus TCP",
+            over_modbus,
+            None,
+            TOOL_READS,
+        )
+
+
 def _compared(
     name: str,
     ours: Callable[[], object],
     against: str,
     floor: Callable[[], object],
     goal: float | None,
+    reads: int = READS,
 ) -> Figure:
-    rounds = [(_typical_us(floor), _typical_us(ours)) for _ in range(ROUNDS)]
+    rounds = [(_typical_us(floor, reads), _typical_us(ours, reads)) for _ in range(ROUNDS)]
     bare, one = (Amount(median(column), "us") for column in zip(*rounds, strict=True))
     return Figure(name, one, against, bare, median(b / a for a, b in rounds), goal)
 
 
-def _typical_us(read: Callable[[], object]) -> float:
+def _typical_us(read: Callable[[], object], reads: int) -> float:
     """Return the median of many reads."""
     passed_ns = []
-    for _ in range(WARM_UP):
+    for _ in range(reads // 10):
         read()
-    for _ in range(READS):
+    for _ in range(reads):
         began_ns = perf_counter_ns()
         read()
         passed_ns.append(perf_counter_ns() - began_ns)

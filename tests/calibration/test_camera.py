@@ -268,6 +268,8 @@ def test_looks_that_agree_with_no_camera_are_refused(sigma_px, code, stated):
 @pytest.mark.parametrize("count", [5, pytest.param(9, marks=pytest.mark.soak)])
 def test_the_interval_holds_the_truth_with_noise_in_the_pixels(count, trials):
     plan = (PLACES + TURNS)[:3] + TURNS[:2] if count == 5 else PLACES + TURNS
+    # An interval of so few looks that is a quarter too narrow still holds the truth in 90 %.
+    trials = max(trials, 500)
     # A pixel is not quite square here, so the noise in mm is not quite round.
     shares = coverage(lambda rng: solve_camera_affine(pictures(plan, rng, 0.3)), TIP, trials)
     assert_honest(shares, trials)

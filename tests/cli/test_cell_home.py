@@ -118,7 +118,7 @@ def test_a_backup_is_neither_compared_nor_restored_elsewhere(place, simulator, u
     assert heard(simulator) == before
 
 
-@pytest.mark.parametrize("home", ["PC8", "pc8", "Pc8."])
+@pytest.mark.parametrize("home", ["PC8", pytest.param("pc8", marks=pytest.mark.soak), "Pc8."])
 def test_at_home_it_is_changed_however_the_name_is_written(place, simulator, url, home):
     line3(place, url, home)
     assert main.run(["-c", "line3", "tool", "set", "1", "--x", "12.5", "--yes"]) == 0

@@ -108,7 +108,7 @@ def test_no_console_makes_a_sentence_fail(encoding):
     )
     paths = os.pathsep.join(path for path in sys.path if path)
     done = subprocess.run(
-        [sys.executable, "-c", program],
+        [sys.executable, "-m", "tests._program", program],
         env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONPATH": paths},
         capture_output=True,
         timeout=30,

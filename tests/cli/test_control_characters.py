@@ -117,7 +117,9 @@ def test_lines_and_the_worlds_characters_are_left_alone():
     assert visible("one\r\ntwo\r\n") == "one\ntwo\n"
 
 
-PRINTS = re.compile(r"\b(s?echo|print|print_exception|print_exc|write|writelines)\b")
+PRINTS = re.compile(
+    r"\b(s?echo|print|print_exception|print_exc)\b|\bstd(out|err)[\s)]*\.\s*write(lines)?\b"
+)
 
 
 def test_there_is_one_door_to_the_console():

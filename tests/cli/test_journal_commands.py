@@ -283,11 +283,13 @@ def test_a_newer_journal_is_exported_but_not_verified(run, document, recorded, s
     assert (code, "newer robolink" in err) == (2, True)
 
 
-def test_looking_at_the_journal_loads_no_driver(recorded):
+def test_looking_at_the_journal_loads_no_driver_and_at_the_cells_no_mathematics(recorded):
     code = (
         "import sys; from robolink_cli import main; main.run(['journal', 'list']);"
-        "print([m for m in sys.modules if m.startswith(('robolink.controllers', 'numpy',"
-        " 'pymodbus', 'can', 'serial'))])"
+        "heavy = ('numpy', 'pymodbus', 'can', 'serial');"
+        "loaded = lambda names: [m for m in sys.modules if m.startswith(names)];"
+        "journal = loaded(('robolink.controllers', *heavy));"
+        "main.run(['cell', 'list']); main.run(['cell', 'files']); print(journal + loaded(heavy))"
     )
     shown = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30

@@ -27,6 +27,13 @@ LINKS: Final = [
 """The links that every test of links uses. The bus within one process is left to ``make soak``: the
 bus between processes demands more.
 """
+LINKS_BUT_OPCUA: Final = [
+    pytest.param(name, marks=pytest.mark.soak if name in ("can-virtual", "opcua") else ())
+    for name in BACKENDS
+]
+"""The same, with OPC UA left to ``make soak`` too, since its server takes the most CPU: for tests
+whose promise other tests hold over OPC UA.
+"""
 FEW_LINKS: Final = [
     pytest.param(name, marks=() if name in ("sim", "modbus-tcp") else pytest.mark.soak)
     for name in BACKENDS

@@ -75,10 +75,14 @@ class TappedLink(MailboxLinkAround):
         super().__init__(inner)
         self._log = log
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """Note a command as it leaves."""
-        self._note("command", command=decode_command(words))
-        self._inner.write_command(words)
+
+        def noted() -> None:
+            admit()
+            self._note("command", command=decode_command(words))
+
+        self._inner.write_command(words, noted)
 
     def read_head(self) -> MailboxHead:
         """Note a look at the head."""

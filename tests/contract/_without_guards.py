@@ -206,6 +206,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.markers.MarkerStore.begin": _begun,
     "robolink.journal._identity._told_twice": lambda _who, first: first,
     "robolink.journal._outcome_log.JournalOutcomeLog._refuse_lost": _nothing,
+    "robolink.journal.store.reserve.LogReserve.keep": _nothing,
     "robolink.journal._homes.CellHome.refusal": _nothing,
     "robolink_cli.commands.fleet.job_gate.JobGate.begin": _nothing,
     "robolink.controllers.markers.MarkerStore.doubt": _open,

@@ -12,6 +12,7 @@ from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.testkit import media
 
 import robolink
+from robolink.transport.opcua import own_certificate as own
 
 SPEED = 40.0
 """Simulated seconds per real second on the socket."""
@@ -59,6 +60,23 @@ def pytest_collection_modifyitems(config, items):
 @pytest.fixture(autouse=True)
 def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+
+
+@pytest.fixture(scope="session")
+def drawn_certificate(tmp_path_factory):
+    """A certificate of this computer with its key, since a key takes a tenth of a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROBOLINK_STATE_DIR", str(tmp_path_factory.mktemp("own")))
+        return own.own_certificate().path.read_bytes()
+
+
+@pytest.fixture
+def own_certificate(drawn_certificate, _own_state_folder):
+    """Lay it where OPC UA finds this computer's own."""
+    path, _ = own.own_files()
+    path.parent.mkdir(parents=True, mode=0o700)
+    path.touch(mode=0o600)
+    path.write_bytes(drawn_certificate)
 
 
 @pytest.fixture(params=["sim", "tcp", "pty", "hardware"])

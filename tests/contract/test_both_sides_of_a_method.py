@@ -66,7 +66,7 @@ def test_an_orientation_is_no_difference_to_a_reference(tmp_path, plc):
     assert 'basis: must be "absolute"' in document["error"]["what"]
 
 
-@pytest.mark.parametrize("cell", on("plc"), indirect=True)
+@pytest.mark.parametrize("cell", on("epson"), indirect=True)
 def test_a_command_says_where_a_surface_is_that_nobody_knows(cell):
     plate = cell.cell.plate
     place = ",".join(f"{value:g}" for value in (plate.x_mm, plate.y_mm, plate.z_mm))
@@ -79,7 +79,7 @@ def test_a_command_says_where_a_surface_is_that_nobody_knows(cell):
     assert "its input must be known first" in refused.document["error"]["what"]
 
 
-@pytest.mark.parametrize("cell", on("plc"), indirect=True)
+@pytest.mark.parametrize("cell", on("epson"), indirect=True)
 def test_a_command_says_where_beams_are_that_nobody_knows(cell):
     x_mm, y_mm, z_mm = cell.cell.place_mm
     beams = [f"--beam={number},{x_mm},{y_mm},{at}" for number, at in ((3, 3), (4, 88))]

@@ -18,8 +18,9 @@ from robolink.calibration_run import (
     flange_now,
 )
 from robolink.errors import ConfigError, VerifyError
+from robolink.journal import memory_journal
 from robolink.methods import PivotSource, informative_tilts
-from robolink.model import Pose, ToolOffset
+from robolink.model import EntryKind, Pose, ToolOffset
 from robolink.procedures import TouchPlan
 from robolink.runner import Ask
 from tests._commands import run_command
@@ -78,7 +79,8 @@ def test_a_pivot_finds_the_whole_tip_writes_it_and_proves_it_in_all_directions(p
     offset = ("--x", "12", "--y", "-3.5", "--z", "-20", "--u", "15", "--v", "8", "--w", "-5")
     assert run(plc.url, "tool", "set", "1", *offset, "--yes")[0] == 0
     words = ("calibrate", "pivot", "--tool", "1", "--assist", plc.url, "--yes", "--speed", "100")
-    code, document, said = run(plc.url, *words, "--count", "4", "--report", str(page))
+    more = ("--count", "4", "--station", "PIN-01", "--report", str(page))
+    code, document, said = run(plc.url, *words, *more)
     assert code == 0, said
     assert document["measured"] == ["x_mm", "y_mm", "z_mm"]
     assert document["proposed"]["v_deg"] == pytest.approx(8.0)
@@ -91,6 +93,9 @@ def test_a_pivot_finds_the_whole_tip_writes_it_and_proves_it_in_all_directions(p
     assert all(abs(drift["dz_mm"]) < 0.1 for drift in document["verification"]["drifts"])
     assert "dZ mm" in page.read_text()
     assert group.values[4] == pytest.approx(12.0, abs=1e-6), "as it stood before"
+    (pin,) = memory_journal(plc.url).entries(kinds=[EntryKind.STATION])
+    place = [pin.details[name] for name in ("x_mm", "y_mm", "z_mm")]
+    assert place == pytest.approx(world.pin_mm, abs=0.1)
 
 
 def test_a_tip_that_slips_after_the_measurement_is_found_and_the_old_value_comes_back():

@@ -2,8 +2,9 @@
 
 import os
 import socket
+import sqlite3
 import threading
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import pytest
@@ -11,7 +12,7 @@ from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
@@ -23,9 +24,18 @@ from robolink.inspection._cell_checks import CheckSlots, most_aside
 from robolink.journal import ChainConflictError, Journal, LeaseHolder, move_journal, open_journal
 from robolink.journal._lease_view import this_process
 from robolink.journal.store.connection import DatabaseConnection
-from robolink.model import EntryKind, NewEntry, Signature, ToolOffset
+from robolink.model import (
+    EntryKind,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    Signature,
+    ToolOffset,
+    plain_offset,
+)
 from robolink.stopping import StopListener, holders_of
-from robolink.transport import far_end_of
+from robolink.timing import wall_label
+from robolink.transport import far_end_of, parse_url
 from tests.contract.journal._acts import run
 from tests.faults._requests import changes
 
@@ -313,6 +323,95 @@ def test_the_record_is_read_once_for_a_cell_and_not_for_each_of_its_tools(line, 
     assert [one.subject for one in checks[0].inspection.findings] == ["2"]
     assert len([one for one in asked if "FROM entries WHERE" in one]) <= 3 * len(chosen)
     assert len(asked) <= 32 * len(chosen)
+
+
+def test_cells_that_are_met_first_are_noted_together_and_not_one_after_the_other(line, monkeypatch):
+    """A commit each, while others wait for the journal, took a quarter of 2,000 first checks."""
+    open_journal()
+    stored, commit = [], DatabaseConnection.commit
+
+    def counted(connection):
+        stored.append(connection)
+        commit(connection)
+
+    monkeypatch.setattr(DatabaseConnection, "commit", counted)
+    assert {*states(check_cells(cells(line))).values()} == {WELL}
+    assert len(stored) == 2  # whom it met, and the checks
+    addresses = [parse_url(one.url).address for one in cells(line)]
+    noted = [open_journal().names_of(address)[0] for address in addresses]
+    assert noted == [on_record()[name].controller for name in line]
+    check_cells(cells(line))
+    assert len(stored) == 3
+
+
+def change_unseen(record, machine):
+    """Put a value on record, as a change does, and another one into the controller."""
+    value = ToolOffset(1, 2, 3)
+    record.begin(Marker("a", MarkerKind.SET, "TLSet 1", wall_label(), {"tool": 1}))
+    details = {"value": plain_offset(value), "before": None, "requested": plain_offset(value)}
+    record.clear("a", NewEntry(EntryKind.DONE, operation="a", tool=1, details=details))
+    record.close()
+    machine.tools.set(1, ToolOffset(1, 2, 29))
+
+
+def found_by_two_checks(url):
+    """Return the codes of what the first check finds, and of what the next one does."""
+    checks = [check_cells([url])[0].inspection for _ in range(2)]
+    return [[str(one.code) for one in check.findings] for check in checks if check]
+
+
+def test_the_first_check_sees_what_is_on_record_under_the_address(line):
+    """It found no problem with a tool that was 26 mm off; only the second check did."""
+    simulator = EpsonSimulator(seed=9)
+    with serve_serial(simulator) as host:  # a port of this computer is lent, and nobody's record
+        address = parse_url(host.url).address
+        change_unseen(open_journal().log(address), simulator.machine)
+        assert found_by_two_checks(host.url) == [["tool_changed"]] * 2
+
+
+def test_robots_that_are_new_are_on_record_before_anything_is_compared(line):
+    simulator = EpsonSimulator("GX4-C351S,C8-C901SR", seed=9)
+    with serve_tcp(simulator) as host:
+        address = parse_url(host.url).address
+        known: list[tuple[str, ...]] = []
+
+        def tools(controller):
+            assert controller.outcomes.open_markers() == ()
+            known.append(open_journal().robots_of(address))
+            return read_tools(controller)
+
+        for _ in range(2):
+            (check,) = check_cells([host.url], tools=tools)
+            assert check.state is WELL
+    first, again = known
+    assert len(first) == 2
+    assert first == again
+
+
+def test_one_controller_at_two_new_addresses_is_told_once(line):
+    """Neither was on record when the other was met."""
+    told: list[str] = []
+    with serve_tcp(line["press-1"]) as again:
+        chosen = [*cells(line), again.url]
+        for _ in range(2):  # one after the other, as it serves one client at a time
+            checks = check_cells(chosen, at_once=1, tell=told.append)
+            assert {check.state for check in checks} == {WELL}
+    assert len([one for one in told if "one controller, one record" in one]) == 1
+    (entry,) = open_journal().entries(kinds=[EntryKind.IDENTITY])
+    assert "one controller, one record" in entry.verdict
+
+
+def test_who_cannot_be_noted_keeps_no_other_off_the_record(line, tmp_path):
+    addresses = [parse_url(one.url).address for one in cells(line)]
+    open_journal()
+    with closing(sqlite3.connect(tmp_path / "state" / "journal.db")) as database:
+        database.execute(
+            "CREATE TRIGGER damaged BEFORE INSERT ON addresses "
+            f"WHEN NEW.address = '{addresses[1]}' BEGIN SELECT RAISE(ABORT, 'damaged'); END"
+        )
+    assert {*states(check_cells(cells(line))).values()} == {WELL}
+    noted = [open_journal().names_of(address)[0] != address for address in addresses]
+    assert noted == [True, False, True, True]
 
 
 def test_a_name_that_is_no_cell_is_refused_before_any_is_asked(line):

@@ -2,6 +2,7 @@
 
 import re
 from contextlib import closing
+from dataclasses import replace
 
 import pytest
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
@@ -21,6 +22,7 @@ from robolink.errors import (
     TransportBrokenError,
     TransportTimeoutError,
 )
+from robolink.model import MotionProfile, Path, WorkBox
 from robolink.register_maps import load_symbol_map
 from robolink.testing import confirm_whole_map
 from robolink.transport import open_opcua
@@ -30,6 +32,7 @@ pytestmark = pytest.mark.simulator_only
 PATIENCE_S = 0.5
 PARENT = "/DeviceSet/*/Resources/Application/GlobalVars/GVL_Tools"
 TOOL = robolink.ToolOffset(1, 2, 3)
+SLOW = MotionProfile(Path.STRAIGHT, speed_mm_s=20)
 
 READS = (
     ("wrong_type", RemoteProtocolError, "has to be"),
@@ -95,7 +98,7 @@ def test_each_fault_that_a_plan_may_have_is_told_by_a_read_or_does_it_no_harm(ro
                 controller.tools.read(1)
 
 
-def test_a_certificate_that_ends_is_told_at_the_next_connection(robolink_state):
+def test_a_certificate_that_ends_is_told_at_the_next_connection(robolink_state, own_certificate):
     plc = SoftMotionSimulator(seed=3)
     with served(plc, "opcua-secured") as url:
         plc.faults.add(PlcFault(PlcFaultAction.EXPIRED_CERTIFICATE, match="read_slots"))
@@ -210,3 +213,46 @@ def test_an_array_that_changes_while_it_is_read_is_never_taken_for_a_tool(roboli
         plc.on_reply = None
         plc.program.set_tool(1, held)
         assert controller.tools.read(1) == due
+
+
+LOOKS_REFUSED = {
+    "opcua": PlcFault(PlcFaultAction.OUT_OF_SERVICE, match="read_response", every=1),
+    "modbus-tcp": PlcFault(PlcFaultAction.MODBUS_EXCEPTION, match="read_", code=6, every=1),
+}
+BEATS_REFUSED = PlcFault(PlcFaultAction.MODBUS_EXCEPTION, match="beat", code=6, every=1)
+
+
+@pytest.mark.parametrize(
+    ("medium", "fault", "command"),
+    [
+        *((medium, fault, "WRITE_TOOL") for medium, fault in LOOKS_REFUSED.items()),
+        *((medium, fault, "MOVE_LINEAR") for medium, fault in LOOKS_REFUSED.items()),
+        ("modbus-tcp", BEATS_REFUSED, "MOVE_LINEAR"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else value.match,
+)
+def test_a_look_that_is_refused_refuses_no_command(robolink_state, medium, fault, command):
+    """The command was sent, and the PLC may carry it out: its answer alone cannot be read."""
+    plc = SoftMotionSimulator(seed=3)
+
+    def refuse_from_here(_number, text):
+        if f"write_command {command}" in text:
+            plc.on_request = None
+            plc.faults.add(fault)
+
+    with served(plc, medium) as url, robolink.connect(url) as controller:
+        controller.motors(True)
+        old, here = controller.tools.read(1), controller.groups[0].pose()
+        plc.on_request = refuse_from_here
+        with pytest.raises(OutcomeUnknownError, match="may or may not have run"):
+            if command == "WRITE_TOOL":
+                controller.tools.write(1, TOOL, expected=old)
+            else:
+                there = replace(here, z_mm=here.z_mm + 20)
+                controller.groups[0].move_to(there, SLOW, box=WorkBox()).wait(timeout_s=20)
+        (marker,) = controller.outcomes.open_markers()
+        assert command in marker.request
+        plc.faults.forget()
+        controller.stop()  # over the same link
+        counted = plc.counters()
+        assert counted["tool_writes"] + counted["moves_started"] <= 1

@@ -44,6 +44,7 @@ from tests.unit._scripted_opcua import told_error
 
 USER, PASSWORD = "cell 3", "correct horse battery"
 OTHER = "ab" * 32
+pytestmark = pytest.mark.usefixtures("own_certificate")
 TOOL = robolink.ToolOffset(1.0, 2.0, 3.0)
 BLOCK = (*[7] * 62, 0, 7)
 """Words of a command, whose beat is what it is at first."""
@@ -53,23 +54,6 @@ BLOCK = (*[7] * 62, 0, 7)
 def server():
     with serve_opcua(SoftMotionSimulator(), users={USER: Secret(PASSWORD)}) as host:
         yield host
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """A certificate of this computer, since drawing a key takes a tenth of a second."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROBOLINK_STATE_DIR", str(tmp_path_factory.mktemp("own")))
-        return own.own_certificate().path.read_bytes()
-
-
-@pytest.fixture(autouse=True)
-def own_state(made, tmp_path, monkeypatch):
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    path, _ = own.own_files()
-    path.parent.mkdir(parents=True, mode=0o700)
-    path.touch(mode=0o600)
-    path.write_bytes(made)
 
 
 @pytest.fixture

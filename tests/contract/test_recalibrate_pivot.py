@@ -44,6 +44,7 @@ def truth(simulator):
     return simulator.world.tips[1].components()[:3]
 
 
+@pytest.mark.soak
 def test_the_example_finds_the_whole_tip_as_the_interval_leads_to_expect(machine, capsys):
     simulator = machine()
     code, document, messages = recalibrate(simulator, EXAMPLE, "--nozzle", "N-1")

@@ -48,7 +48,7 @@ def test_the_page_states_how_long_each_recipe_takes(name, answer_ms):
 @pytest.mark.parametrize(
     ("answer_ms", "most_s", "most_exchanges", "most_bytes"),
     [
-        (0, 10.0, 850, 80_000),
+        pytest.param(0, 10.0, 850, 80_000, marks=pytest.mark.soak),
         pytest.param(5, 12.0, 550, 110_000, marks=pytest.mark.soak),
         (20, 20.0, 450, 90_000),
     ],

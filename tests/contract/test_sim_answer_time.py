@@ -35,7 +35,11 @@ pytestmark = pytest.mark.simulator_only
 ANSWER_MS = 20
 ANSWER_S = ANSWER_MS / 1000
 READS = 3
-LINKS = [(kind, medium) for kind, media in MEDIA.items() for medium in media]
+LINKS = [
+    pytest.param(kind, medium, marks=pytest.mark.soak if medium == "opcua-secured" else ())
+    for kind, media in MEDIA.items()
+    for medium in media
+]
 CARRIED_S = {("softmotion", "sim"): 0.001}
 """What an exchange with the mailbox takes in the process besides (``exchange_us``)."""
 
@@ -243,7 +247,7 @@ def test_twenty_times_as_fast_it_takes_a_twentieth_of_real_time():
 
 
 @pytest.mark.parametrize(
-    ("kind", "medium"), [link for link in LINKS if link[1] != "sim"], ids=lambda value: value
+    ("kind", "medium"), [link for link in LINKS if link.values[1] != "sim"], ids=lambda value: value
 )
 def test_where_time_stands_still_an_exchange_lets_it_pass(kind, medium, tmp_path):
     simulator, path = made(kind, tmp_path, answer_ms=2000, medium=medium)

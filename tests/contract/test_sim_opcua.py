@@ -163,7 +163,7 @@ def test_our_client_writes_a_tool_and_moves_the_robot_to_its_end(plc):
     assert plc.counters()["moves_started"] == 1
 
 
-def test_our_client_does_the_same_signed_and_encrypted(plc, robolink_state):
+def test_our_client_does_the_same_signed_and_encrypted(plc, robolink_state, own_certificate):
     with served(plc, "opcua-secured") as url, robolink.connect(url) as controller:
         old = controller.tools.read(3)
         controller.tools.write(3, TOOL, expected=old)
@@ -171,7 +171,7 @@ def test_our_client_does_the_same_signed_and_encrypted(plc, robolink_state):
     assert "security=" not in url
 
 
-def test_our_client_comes_in_as_the_user_of_the_server(plc, robolink_state):
+def test_our_client_comes_in_as_the_user_of_the_server(plc, robolink_state, own_certificate):
     users = {"ada": Secret("correct-horse")}
     with serve_opcua(plc, users=users) as host:
         with robolink.connect(host.secured_url, password="correct-horse") as controller:
@@ -180,7 +180,8 @@ def test_our_client_comes_in_as_the_user_of_the_server(plc, robolink_state):
             robolink.connect(host.secured_url, password="wrong-horse")
 
 
-def test_our_client_refuses_a_certificate_that_ended_or_is_another_one(plc, robolink_state):
+@pytest.mark.usefixtures("robolink_state", "own_certificate")
+def test_our_client_refuses_a_certificate_that_ended_or_is_another_one(plc):
     with serve_opcua(plc, expired=True) as host, pytest.raises(ConfigError, match="counts from"):
         robolink.connect(host.secured_url)
     with serve_opcua(plc) as host:

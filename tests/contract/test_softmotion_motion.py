@@ -21,12 +21,12 @@ from robolink.errors import (
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols.mailbox import CoordinateSystem, ErrorClass
-from tests.contract._softmotion_cell import LINKS, QUICK, SLOW, above, served
+from tests.contract._softmotion_cell import LINKS, LINKS_BUT_OPCUA, QUICK, SLOW, above, served
 
 ANYWHERE = WorkBox()
 
 
-@pytest.fixture(params=LINKS)
+@pytest.fixture(params=LINKS_BUT_OPCUA)
 def cell(request):
     with served(request.param) as cell:
         yield cell
@@ -43,6 +43,7 @@ def group(controller):
     return controller.groups[0]
 
 
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 def test_a_straight_move_arrives_and_the_next_may_begin_at_once(cell, group):
     start = group.pose()
     for by_mm in (2.0, 0.0):
@@ -105,6 +106,7 @@ def test_a_disabled_group_is_not_moved(cell, controller, group):
     assert cell.movements_started == 0
 
 
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 def test_a_stop_from_another_thread_gets_in_holds_and_is_released_by_a_reset(
     cell, controller, group, monkeypatch
 ):
@@ -138,6 +140,7 @@ def test_a_stop_from_another_thread_gets_in_holds_and_is_released_by_a_reset(
     assert cell.open_requests == []
 
 
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 def test_a_halted_movement_ends_where_it_is_and_the_group_moves_again(cell, group):
     start = group.pose()
     motion = group.move_to(above(start, 20.0), SLOW, box=ANYWHERE)
@@ -157,6 +160,7 @@ def test_a_move_that_takes_too_long_is_halted_and_its_end_is_seen(cell, group):
 
 
 @pytest.mark.fault("F21")
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 @pytest.mark.parametrize("danger", ["press_estop", "fail_axis"])
 def test_an_emergency_stop_or_a_failing_drive_ends_the_move_and_nothing_is_sent_again(
     cell, controller, group, danger
@@ -178,6 +182,7 @@ def test_an_emergency_stop_or_a_failing_drive_ends_the_move_and_nothing_is_sent_
     assert group.move_to(near, QUICK, box=ANYWHERE).wait(timeout_s=10) is MotionOutcome.ARRIVED
 
 
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 def test_a_jog_goes_for_a_time_and_the_group_is_at_rest_afterwards(cell, controller, group):
     start = group.pose()
     jog = Jog(forward=frozenset({2}), speed_mm_s=10.0)
@@ -204,6 +209,7 @@ def test_a_jog_of_an_axis_goes_by_a_share_of_its_own_speed(group):
     assert after[1:] == pytest.approx(before[1:])
 
 
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 def test_a_movement_on_which_nobody_waits_is_halted_on_purpose(cell, group):
     motion = group.move_to(above(group.pose(), 20.0), SLOW, box=ANYWHERE)
     cell.clock.advance(0.6)

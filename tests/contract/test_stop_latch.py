@@ -58,10 +58,12 @@ def told(log, *looks: str) -> list[str]:
     return [text for text in sent if not text.startswith(looks)]
 
 
-BACKENDS = ("epson-sim", "epson-tcp", *plcs.LINKS)
+EPSON = ("epson-sim", "epson-tcp")
+BACKENDS = (*EPSON, *plcs.LINKS)
+BUT_OPCUA = (*EPSON, *plcs.LINKS_BUT_OPCUA)
 
 
-@pytest.fixture(params=BACKENDS)
+@pytest.fixture(params=BUT_OPCUA)
 def stopped(request):
     with bench(request.param) as on:
         on.controller.tools.write(2, ToolOffset(1.0), expected=on.controller.tools.read(2))
@@ -88,6 +90,7 @@ def acts(on: Bench):
     return found
 
 
+@pytest.mark.parametrize("stopped", BACKENDS, indirect=True)
 def test_nothing_that_acts_leaves_until_it_is_released(stopped):
     where, before = stopped.group.pose(), stopped.requests()
     for name, act in acts(stopped).items():
@@ -99,6 +102,7 @@ def test_nothing_that_acts_leaves_until_it_is_released(stopped):
     assert stopped.controller.outcomes.open_markers() == ()
 
 
+@pytest.mark.parametrize("stopped", BACKENDS, indirect=True)
 def test_after_the_release_and_a_reset_it_moves_again(stopped):
     controller, group = stopped.controller, stopped.group
     controller.reset_fault()
@@ -111,6 +115,7 @@ def test_after_the_release_and_a_reset_it_moves_again(stopped):
     assert group.pose().z_mm == pytest.approx(here.z_mm + 1, abs=0.2)
 
 
+@pytest.mark.parametrize("stopped", BACKENDS, indirect=True)
 def test_motors_off_and_another_stop_are_always_let_through(stopped):
     stopped.controller.stop()
     if type(stopped.controller).__name__ == "EpsonController":
@@ -168,7 +173,7 @@ def test_a_stop_while_a_person_is_asked_about_a_reset_is_not_released_by_the_yes
         controller.reset_fault()
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BUT_OPCUA)
 @pytest.mark.parametrize("asked", ["place", "yes or no", "text"])
 def test_an_answer_that_a_stop_overtakes_counts_no_more(backend, asked):
     with bench(backend) as on:

@@ -17,6 +17,7 @@ from robolink.errors import (
     LoginUnansweredError,
     NotReadyError,
     RejectedError,
+    RemoteProtocolError,
 )
 from robolink.model import ControllerState, MotionProfile, Path, WorkBox
 from tests.contract._softmotion_cell import BACKENDS, LINKS, SLOW, above
@@ -212,7 +213,7 @@ def test_a_beat_that_is_refused_holds_no_stop_back():
         controller.tools.write(3, ToolOffset(1.0, 2.0, 3.0), expected=ANY)
         cell.clock.advance(2.0)  # a beat is due
         cell.simulator.faults.add(refused)
-        with pytest.raises(RejectedError):
+        with pytest.raises(RemoteProtocolError, match="server busy"):
             controller.status()
         cell.clock.advance(2.0)
         controller.stop()

@@ -128,6 +128,7 @@ def test_a_tool_is_written_and_read_back(server, text):
     assert served.in_force() == NEW
 
 
+@pytest.mark.usefixtures("own_certificate")
 def test_signed_and_encrypted_a_user_writes():
     plc, users = PlcSimulator(load_symbol_map(ARRAYS), seed=7), {"fitter": Secret("correct-horse")}
     with serve_plc_opcua(plc, ARRAYS, clock=ScaledClock(10.0), users=users) as host:

@@ -153,9 +153,9 @@ def _watch_commits(noted: Path, kill_at: CommitStep | None) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
 
     @contextmanager
-    def watched(store: Store, *told: str) -> Iterator[Tables]:
+    def watched(store: Store, what: str = "", then: str = "", **room: int) -> Iterator[Tables]:
         nonlocal number
-        with write(store, *told) as tables:
+        with write(store, what, then, **room) as tables:
             yield tables
             number += 1
             head = tables.entries.head()

@@ -20,6 +20,7 @@ _FORKS.set_forkserver_preload(
         "tests.faults._loaded_first",
         # Other processes started from here. They import this module, which is complete by then.
         "tests.faults._change_process",
+        "tests.faults._holding_process",
         "tests.faults._operator_process",
     ]
 )

@@ -95,7 +95,7 @@ class MortalCell:
 
     def _end_pc(self, _at: Instant) -> None:
         @contextmanager
-        def written(*_given):
+        def written(*_given, **_room):
             raise PcGone
             yield
 

@@ -98,12 +98,12 @@ def _watch_mailbox(wait: Wait) -> None:
         wait("tool read", slot)
         return read_slot(wire, slot)
 
-    def block_written(wire: MailboxWire, words: Sequence[int]) -> None:
+    def block_written(wire: MailboxWire, words: Sequence[int], admit: Callable[[], None]) -> None:
         if words[COMMAND["opcode"].word] == Opcode.WRITE_TOOL:
             wait("tool write", words[COMMAND["i0"].word], by_mailbox=True)
         else:
             wait("mailbox command")
-        write(wire, words)
+        write(wire, words, admit)
         unseen.append(wire)
 
     def before_answer() -> None:
@@ -135,9 +135,9 @@ def _watch_journal(wait: Wait) -> None:
             yield tables
 
     @contextmanager
-    def writing(store: Store, *told: str) -> Iterator[Tables]:
+    def writing(store: Store, what: str = "", then: str = "", **room: int) -> Iterator[Tables]:
         wait("journal write")
-        with write(store, *told) as tables:
+        with write(store, what, then, **room) as tables:
             yield tables
 
     Store.read, Store.write = reading, writing  # type: ignore[method-assign, assignment]

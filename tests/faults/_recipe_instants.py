@@ -148,9 +148,9 @@ def exchanges_and_commits(simulator: HostedDevice, instants: Instants) -> Iterat
         instants.pass_by("answer", asked.get(number, ""))
 
     @contextmanager
-    def written(store: Store, *told: str) -> Iterator[Tables]:
+    def written(store: Store, what: str = "", then: str = "", **room: int) -> Iterator[Tables]:
         instants.pass_by("commit", "before")
-        with write(store, *told) as tables:
+        with write(store, what, then, **room) as tables:
             yield tables
         instants.pass_by("commit", "after")
 

@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from typing import Final
 
 import pytest
@@ -10,6 +11,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.model import ToolOffset
 from robolink.protocols.mailbox import COMMAND, Opcode, Six, from_frame, to_frame
+from robolink.runtime import SystemRuntime, replaced
 from tests.faults._recipe_cell import RecipeCell
 
 _OPCODE: Final = COMMAND["opcode"].word
@@ -142,6 +144,18 @@ class PlcRecipeCell(RecipeCell):
         return [text.split()[1] for text in self.requests() if text.startswith(sent)]
 
 
+class _NoThreads(SystemRuntime):
+    """Gives no signs of life: each takes simulated time, at an instant of the real one.
+
+    So a run would be another one on a busy computer.
+    """
+
+    def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
+        """See :meth:`robolink.runtime.SystemRuntime.regularly`; ``act`` is never called."""
+        del every_s, act, name
+        return lambda: None
+
+
 class OpcuaRecipeCell(PlcRecipeCell):
     """The same behind its OPC UA server."""
 
@@ -160,16 +174,20 @@ class OpcuaRecipeCell(PlcRecipeCell):
 
         self.assist = super()._register()
         self._patch = pytest.MonkeyPatch()
+        self._surroundings = ExitStack()
+        self._surroundings.enter_context(replaced(_NoThreads()))
         served = SteppedOpcua(self.simulator, self.clock)
         self._patch.setattr("robolink.transport.opcua.mailbox.open_client", served.client)
         self._patch.setattr(OpcuaMailboxLink, "durable", False)  # it ends with the process
         write = OpcuaMailboxLink.write_command
 
-        def written(link: OpcuaMailboxLink, words: Sequence[int]) -> None:
+        def written(
+            link: OpcuaMailboxLink, words: Sequence[int], admit: Callable[[], None]
+        ) -> None:
             moves = Opcode(words[_OPCODE]).name.startswith("MOVE")
             self._due = super(OpcuaRecipeCell, self).moves_asked() + moves
             try:
-                write(link, words)
+                write(link, words, admit)
             finally:
                 self._due = 0
 
@@ -177,5 +195,6 @@ class OpcuaRecipeCell(PlcRecipeCell):
         return f"softmotion+opcua://{self.name}?{UNSECURED}"
 
     def _unregister(self) -> None:
+        self._surroundings.close()
         self._patch.undo()
         super()._unregister()

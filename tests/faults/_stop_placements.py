@@ -110,7 +110,7 @@ class Placements:
             self.distinct[here] = None
             if here == self._at:
                 assert self._controller is not None
-                self._stop(self._controller, held=point is Checkpoint.HELD)
+                self._stop(self._controller, held=bool(self._held))
 
     def _placeable(self, here: Placement) -> bool:
         # Once the logout is on its way there is no session left to stop anything with.

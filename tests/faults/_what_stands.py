@@ -81,10 +81,10 @@ def commits(refused: Callable[[int], bool]) -> Iterator[list[int]]:
     write, seen = Store.write, list[int]()
 
     @contextmanager
-    def watched(store: Store, *told: str) -> Iterator[Tables]:
+    def watched(store: Store, what: str = "", then: str = "", **room: int) -> Iterator[Tables]:
         number = len(seen)
         seen.append(number)
-        with write(store, *told) as tables:
+        with write(store, what, then, **room) as tables:
             if not refused(number):
                 yield tables
                 return

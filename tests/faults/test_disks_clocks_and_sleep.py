@@ -54,9 +54,9 @@ def await_that(condition: Callable[[], bool], process: ClientProcess) -> None:
 # ---- F61
 
 ON_A_SMALL_DISK = """
-mount -t tmpfs -o size=256k none {disk} || exit 99
+mount -t tmpfs -o size=1m none {disk} || exit 99
 {python} -m robolink_cli -c {url} tool set 2 --x 1 --yes || exit 98
-head -c 1M /dev/zero > {disk}/other 2>/dev/null
+head -c 2M /dev/zero > {disk}/other 2>/dev/null
 exec {python} -m robolink_cli -c {url} tool set 1 --x 12.5 --yes
 """
 

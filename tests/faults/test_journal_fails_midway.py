@@ -25,12 +25,12 @@ class Failing:
         self.first = None
         write = Store.write
 
-        def counted(store, *told):
+        def counted(store, *told, **room):
             self.count += 1
             if self.first is not None and self.count >= self.first:
                 what = "The journal cannot be used: the disk is full."
                 raise JournalError(what, remedy=" ".join(("Free space.", *told)).strip())
-            return write(store, *told)
+            return write(store, *told, **room)
 
         monkeypatch.setattr(Store, "write", counted)
 

@@ -34,8 +34,7 @@ TESTS: Final = [
 ]
 EACH_TIME: Final[dict[str, tuple[str, ...]]] = {
     "EPSON, two tools": (CTRL_C, "e-stop", "guard"),
-    "PLC, two tools": (CTRL_C, "drive fault"),
-    "PLC, one tool": ("e-stop", "permit"),
+    "PLC, one tool": (CTRL_C, "e-stop", "drive fault", "permit"),
 }
 """Each disturbance on each kind; the same of the other number of tools runs only in soak.
 

@@ -54,7 +54,7 @@ def stopped(case: Case, at: Placement, folder) -> None:
         placements = Placements(at, rest)
         with placements.watching():
             ended = case.run(cell, folder, Instants())
-        assert rest.moves >= 0, "the point was not reached"
+        assert rest.moves >= 0, f"the point was not reached: {ended.code} {ended.err}"
         assert placements.acknowledged, placements.refused
         check_nothing_went_on(cell, ended, rest)
         check_said(cell, ended)

@@ -4,7 +4,9 @@ Before there was a latch, 208 of 400 such stops were acknowledged and the moveme
 still left. The moments are drawn over the time that a start of a movement takes here.
 """
 
+import os
 import random
+import signal
 import threading
 import time
 from dataclasses import replace
@@ -12,6 +14,7 @@ from dataclasses import replace
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 
+from robolink import interrupts
 from robolink.errors import StoppedError
 from robolink.model import MotionProfile, Path, WorkBox
 from tests._patience import PATIENCE_S
@@ -21,6 +24,7 @@ from tests.contract.conftest import served
 ANYWHERE = WorkBox()
 STEP = MotionProfile(Path.STRAIGHT, 5, 50.0)
 STEP_MM = 0.5
+_HEARTBEAT_WORD = 62
 
 
 @pytest.fixture(autouse=True)
@@ -94,3 +98,57 @@ def test_no_movement_begins_after_an_acknowledged_stop_on_a_plc(trials):
             controller, lambda: cell.simulator.plc.group.movements_started, trials, reset=True
         )
     assert after == 0
+
+
+def stop_beside(controller):
+    """Stop in another thread; returns once nothing may leave any more."""
+    threading.Thread(target=controller.stop).start()
+    come_true(lambda: controller.latch.closed)
+
+
+def press_ctrl_c(_controller):
+    """Interrupt the main thread; returns once it has heard that inside of its exchange."""
+    os.kill(os.getpid(), signal.SIGINT)
+    come_true(lambda: interrupts._handler.held)
+
+
+def come_true(what):
+    deadline = time.monotonic() + PATIENCE_S
+    while not what():
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
+
+
+@pytest.mark.parametrize(
+    ("end", "error"), [(stop_beside, StoppedError), (press_ctrl_c, KeyboardInterrupt)]
+)
+@pytest.mark.usefixtures("signals_of_a_terminal")
+def test_between_the_beat_and_its_command_over_opc_ua_a_movement_is_still_held_back(
+    monkeypatch, end, error
+):
+    """The PLC has got the beat and not answered it, so the command has not left yet."""
+    with plcs.served("opcua") as cell, cell.connect() as controller:
+        group = controller.groups[0]
+        move(group, STEP_MM).wait(timeout_s=20)
+        write = cell.simulator.write
+        ended: list[object] = []
+
+        def meet(start, words, *more):
+            if start == _HEARTBEAT_WORD and cell.open_requests and not ended:
+                ended.append(words)
+                end(controller)
+            return write(start, words, *more)
+
+        before, moved = len(cell.commands), cell.movements_started
+        monkeypatch.setattr(cell.simulator, "write", meet)
+        with pytest.raises(error):
+            move(group, STEP_MM)
+        assert ended, "no beat came before the command"
+        controller.stop()
+        assert set(cell.commands[before:]) <= {"STOP", "HALT"}
+        assert cell.movements_started == moved
+        assert cell.open_requests == []
+        controller.release_stop()
+        controller.reset_fault()
+        move(group, STEP_MM).wait(timeout_s=20)
+        assert cell.movements_started == moved + 1

@@ -8,6 +8,7 @@ followed, and a sample of those with two tools; ``ROBOLINK_ALL_KILL_POINTS=1`` f
 """
 
 import os
+from functools import cache
 from itertools import combinations
 
 import pytest
@@ -64,6 +65,9 @@ def test_f46_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp
     print(f"{pair}: {orders.seen} orders; refused: {dict(ends)}")  # noqa: T201 - for pytest -s
 
 
+steps_apart = cache(apart)
+
+
 class OnPaper:
     """Implements ``Run`` for two operators who always take the same steps."""
 
@@ -85,7 +89,7 @@ class OnPaper:
         return frozenset(
             (one[:2], other[:2])
             for one, other in combinations(self.done, 2)
-            if one[0] != other[0] and not apart(one[2], other[2])
+            if one[0] != other[0] and not steps_apart(one[2], other[2])
         )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robolink.fleet import FleetStore
-from tests.contract.journal._postgresql import Server
+from tests.contract.journal._postgresql import Server, asked
 from tests.fleet._moving_cells import MovingCells, moving_cells
 
 
@@ -38,8 +38,24 @@ def location(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     if request.param == "sqlite":
         return str(tmp_path / "plant.db")
     server: Server = request.getfixturevalue("server")
-    server.execute("DROP SCHEMA IF EXISTS fleet CASCADE")
+    asked(server.url(), "DROP SCHEMA IF EXISTS fleet CASCADE")
     return server.url()
+
+
+@pytest.fixture(scope="session")
+def engine_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of an engine that was started and stopped.
+
+    To make its 30 tables takes as long as all else that an engine does at its start. Those of an
+    agent in a process of its own make theirs.
+    """
+    from robolink.fleet.engine import Engine
+
+    file = tmp_path_factory.mktemp("engine") / "jobs.db"
+    engine = Engine(f"sqlite:///{file}", "plant", print, workers=1)
+    engine.start()
+    engine.stop(60.0)
+    return file
 
 
 @pytest.fixture

@@ -27,6 +27,8 @@ from robolink.transport import far_end_of, parse_url
 
 PERMIT = Permit(1, "plant", "Chen", "engineer", "2026-11-30", "2026-12-31")
 
+SOAK = pytest.mark.soak
+
 
 @pytest.fixture
 def simulator():
@@ -119,7 +121,10 @@ def test_a_stop_after_an_offset_is_kept_takes_nothing_back(acts, simulator, dist
     assert simulator.machine.flash_writes == 1
 
 
-@pytest.mark.parametrize("defect", [ZeroDivisionError("a defect"), OSError(28, "no space left")])
+@pytest.mark.parametrize(
+    "defect",
+    [ZeroDivisionError("a defect"), pytest.param(OSError(28, "no space left"), marks=SOAK)],
+)
 def test_what_ends_in_a_defect_is_done_by_the_next_delivery(acts, simulator, disturbed, defect):
     def fails(_controller):
         raise defect
@@ -209,7 +214,7 @@ def test_a_cell_that_is_locked_off_or_unsettled_says_so(acts, simulator, cell_fi
     assert simulator.machine.flash_writes == 0
 
 
-@pytest.mark.parametrize("kind", ["backup", "check", "offset"])
+@pytest.mark.parametrize("kind", [pytest.param("backup", marks=SOAK), "check", "offset"])
 def test_a_stop_from_another_terminal_reaches_the_controller(kind, acts, simulator):
     simulator.answer_s = 0.05
     stopped: list[str] = []
@@ -300,7 +305,9 @@ def test_a_backup_folder_that_cannot_be_written_halts_the_plan(cell_file, tmp_pa
     assert (ended.error, treatment(ended)) == ("PlanError", Treatment.HALT)
 
 
-@pytest.mark.parametrize("kind", ["offset", "backup", "check", "drift"])
+@pytest.mark.parametrize(
+    "kind", ["offset", "check", *[pytest.param(kind, marks=SOAK) for kind in ("backup", "drift")]]
+)
 def test_nothing_is_done_where_the_cell_file_names_another_home(kind, acts, cell_file, simulator):
     said = cell_file.read_text()
     cell_file.write_text(f'{said}home = "another-computer"\n')

@@ -4,6 +4,7 @@ Real databases, real threads, a real kill; jobs write to files and touch no cell
 """
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -22,7 +23,8 @@ from robolink.fleet.errors import PlantError
 def url(request, tmp_path):
     """The address of an empty database of the engine's own."""
     if request.param == "sqlite":
-        return f"sqlite:///{tmp_path / 'jobs.db'}"
+        file = shutil.copy(request.getfixturevalue("engine_file"), tmp_path)
+        return f"sqlite:///{file}"
     server = request.getfixturevalue("server")
     name = f"fleet{time.monotonic_ns()}"
     server.execute(f"CREATE DATABASE {name}")

@@ -66,14 +66,14 @@ def test_the_first_look_is_at_the_fifth_cell_and_spends_the_most():
 def test_a_score_is_standard_normal_whatever_the_scatter_and_the_number_of_earlier_values():
     chance = random.Random(11)
     scores = []
-    for number in range(1200):
+    for number in range(600):
         sigma, count = (0.01, 20) if number % 2 else (0.4, 60)
         values = [chance.gauss(3.0, sigma) for _ in range(count + 1)]
         scores.append(TipCorrection.of(1, "x", values[-1], values[:-1]).score())
     told = NormalDist.from_samples(scores)
     assert abs(told.mean) < 0.09
     assert abs(told.stdev - 1) < 0.08
-    assert sum(abs(score) > 1.96 for score in scores) / 1200 == pytest.approx(0.05, abs=0.02)
+    assert sum(abs(score) > 1.96 for score in scores) / 600 == pytest.approx(0.05, abs=0.02)
 
 
 def test_a_recipe_that_is_wrong_everywhere_halts_at_the_fifth_cell():

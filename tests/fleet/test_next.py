@@ -25,6 +25,7 @@ from tests._commands import run_command
 from tests.fleet._moving_cells import NEW, OLD, PersonAtCell
 
 SCARA = Path(__file__).parents[2] / "examples" / "recipes" / "scara-pin.toml"
+SOAK = pytest.mark.soak
 
 
 def orders():
@@ -153,7 +154,8 @@ def later(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "meanwhile", ["halted", "cancelled", "revoked", "another permit", "window"]
+    "meanwhile",
+    ["halted", "cancelled", "revoked", pytest.param("another permit", marks=SOAK), "window"],
 )
 def test_what_holds_a_plan_back_after_it_was_shown_holds_the_job_back(cells, later, meanwhile):
     hour = datetime.now().astimezone().hour
@@ -432,8 +434,10 @@ def kept_by(gate, controller, then=None):
     ("then", "code", "state"),
     [
         (StoppedError("Somebody stopped it."), 0, JobState.KEPT),
-        (KeyboardInterrupt(), 0, JobState.KEPT),
-        (NotReadyError("Open.", reason=NotReadyReason.GUARD_OPEN), 0, JobState.KEPT),
+        pytest.param(KeyboardInterrupt(), 0, JobState.KEPT, marks=SOAK),
+        pytest.param(
+            NotReadyError("Open.", reason=NotReadyReason.GUARD_OPEN), 0, JobState.KEPT, marks=SOAK
+        ),
         (ZeroDivisionError("a defect"), 0, JobState.KEPT),
         (OutcomeUnknownError("Nobody knows where it stands."), 6, JobState.UNSETTLED),
     ],
@@ -463,7 +467,10 @@ def test_a_stop_before_the_value_is_kept_is_the_end_of_the_job(cells):
     assert (cells.job(plan, "a").state, cells.job(plan, "a").code) == (JobState.REFUSED, 10)
 
 
-@pytest.mark.parametrize("defect", [ZeroDivisionError("a defect"), OSError(28, "no space left")])
+@pytest.mark.parametrize(
+    "defect",
+    [ZeroDivisionError("a defect"), pytest.param(OSError(28, "no space left"), marks=SOAK)],
+)
 def test_after_a_defect_the_resumed_plan_delivers_the_job_again(cells, defect):
     plan = cells.plan()
     gate = JobGate(cells.store, planned_at(cells))

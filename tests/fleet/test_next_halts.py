@@ -62,7 +62,7 @@ def course(cells: MovingCells, plan, *words: str) -> tuple[list[str], list[str]]
 
 
 @pytest.mark.parametrize("location", ["sqlite"], indirect=True)
-@pytest.mark.parametrize("wrong", [True, False])
+@pytest.mark.parametrize("wrong", [True, pytest.param(False, marks=pytest.mark.soak)])
 def test_a_recipe_that_is_wrong_everywhere_halts_its_plan(cells_of, wrong):
     """It names the points that were taught with another kind of nozzle."""
     cells, random = cells_of(*"abcdef"), np.random.default_rng(11)

@@ -69,7 +69,7 @@ def check_once(cells, plan, written):
     assert len(written) == left
 
 
-@pytest.mark.parametrize("where", ["begun", "unreported"])
+@pytest.mark.parametrize("where", [pytest.param("begun", marks=pytest.mark.soak), "unreported"])
 def test_a_job_whose_process_is_killed_is_carried_out_once(cells, written, where):
     plan = cells.plan()
     ended = killed(where)

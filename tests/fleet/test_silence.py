@@ -6,6 +6,7 @@ What hangs here is what has no deadline: a file that nobody writes, a disk that 
 # ruff: noqa: F401, F811 - fixtures of another module
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -160,11 +161,12 @@ def test_a_job_that_has_ended_is_not_cut_off(stepped):
 
 
 @pytest.fixture
-def hasty(monkeypatch):
+def hasty(monkeypatch, tmp_path, engine_file):
     """Has an agent take jobs for silent at once."""
+    shutil.copy(engine_file, tmp_path / "plant.db.jobs")
     monkeypatch.setattr("robolink.fleet.silence.SILENT_S", 0.05)
     for name in ("LOOK_S", "_TURN_S", "_GATHER_S"):
-        monkeypatch.setattr(f"robolink.fleet.agent.{name}", 0.02)
+        monkeypatch.setattr(f"robolink.fleet.agent.{name}", 0.05)
 
 
 def test_what_a_person_resumed_stays_so_while_the_thread_hangs_and_when_it_wakes(tmp_path, hasty):

@@ -448,7 +448,6 @@ def course(store, plan, cells, off_mm):
     return None
 
 
-@EACH_DATABASE
 def test_cells_that_move_alike_halt_at_the_fifth_and_a_person_accepts_the_shift(store):
     plan = permitted(store, plan_with(60, auto=True, at_once=1))
     halt = course(store, plan, plan.cells, 0.2)
@@ -479,9 +478,10 @@ location, plan = sys.argv[1:]
 store = FleetStore(location)
 for cell in store.plan(plan).cells:
     turn = store.begin(plan, cell)
-    print("begun", cell, flush=True)
+    # Each in one write, so that a killed process tells whole lines.
+    print(f"begun {cell}\\n", end="", flush=True)
     store.record_outcome(plan, cell, turn.job.attempt, JobOutcome(0, change=cell))
-    print("ended", cell, flush=True)
+    print(f"ended {cell}\\n", end="", flush=True)
 """
 
 
@@ -506,16 +506,25 @@ def test_what_a_killed_process_was_told_is_on_record(open_store, location, wall)
         assert store.begin(plan.id, cell).job.attempt == 1
 
 
-@EACH_DATABASE
-def test_a_database_that_comes_back_is_found_again(open_store, location, server_of):
-    store = open_store()
+def require_found_again(store, away):
+    """Lose a database in the midst of a job; the same store is to go on once it is there again."""
     plan = permitted(store, plan_with(kind="check"))
     attempt = store.begin(plan.id, FIRST).job.attempt
-    with server_of(location), pytest.raises(PlantError, match=r"cannot be used|was moved"):
+    with away, pytest.raises(PlantError, match=r"cannot be used|was moved"):
         store.record_outcome(plan.id, FIRST, attempt, JobOutcome(0))
     assert store.begin(plan.id, FIRST).begun
     store.record_outcome(plan.id, FIRST, attempt, JobOutcome(0))
     assert store.record_outcome(plan.id, FIRST, attempt, JobOutcome(0)).repeated
+
+
+def test_a_database_that_comes_back_is_found_again(open_store, location, server_of):
+    require_found_again(open_store(), server_of(location))
+
+
+def test_a_server_that_cut_its_connections_is_found_again(server):
+    url = server.empty_database()
+    with FleetStore(url) as store:
+        require_found_again(store, server.closed(url))
 
 
 @EACH_DATABASE

@@ -49,9 +49,7 @@ for module, names in NAMES.items():
 '''
 
 CHOSEN = (
-    "tests/unit/test_recipe_files.py",
     "tests/unit/test_interrupts.py",
-    "tests/unit/test_urls.py",
     "tests/unit/test_transport_tcp_failures.py",
     "tests/unit/test_transport_trace.py",
     "tests/unit/test_config_files.py",
@@ -70,14 +68,10 @@ LEFT_OUT = (
     "tests/unit/test_transport_tcp_failures.py::"
     "test_a_link_works_where_the_platform_lacks_something",
     # The programs that they start have all of POSIX.
-    "tests/unit/test_recipe_files.py::test_pydantic_waits_for_the_first_recipe",
     "tests/cli/test_cli_frame.py::test_looking_at_the_commands_loads_none_of_the_heavy_packages",
     "tests/cli/test_cli_frame.py::test_a_tool_is_read_without_an_eye",
     "tests/cli/test_cli_output.py::test_no_console_makes_a_sentence_fail",
     "tests/cli/test_cli_output.py::test_a_reader_that_leaves_early_causes_no_noise",
-    # Thousands of files and texts that are read the same everywhere.
-    "tests/unit/test_recipe_files.py::test_whatever_stands_in_a_place_is_accepted_or_told",
-    "tests/unit/test_urls.py::test_any_text_is_a_url_or_a_config_error",
 )
 
 

@@ -155,10 +155,17 @@ class Users:
         return User(role=UserRole.User, name=username) if right or anybody else None
 
 
-async def _made(users: Users) -> tuple[Any, dict[str, Any]]:
+async def _made(users: Users, standard: Any) -> tuple[Any, dict[str, Any]]:
     from asyncua import Server, ua
+    from asyncua.server.internal_server import InternalServer
 
-    server = Server(user_manager=users)
+    internal: Any = InternalServer(users)
+
+    async def take_standard(_shelf_file: Any) -> None:
+        internal.aspace._nodes = standard  # which takes a second to make
+
+    internal.load_standard_address_space = take_standard
+    server = Server(iserver=internal)
     await server.init()
     await server.load_certificate(own("server").certificate, "der")
     await server.load_private_key(own("server").key, format="pem")
@@ -188,6 +195,9 @@ async def _made(users: Users) -> tuple[Any, dict[str, Any]]:
 @contextmanager
 def far_end() -> Iterator[FarEnd]:
     """Serve one on a free port of loopback, with and without security."""
+    from robolink_simulators.hosting.fieldbus.opcua_nodes import OwnNodes
+
+    standard = OwnNodes()  # first: only what follows has a limit
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever, daemon=True)
     thread.start()
@@ -196,7 +206,7 @@ def far_end() -> Iterator[FarEnd]:
         return asyncio.run_coroutine_threadsafe(coroutine, loop).result(40)
 
     users = Users()
-    server, nodes = run(_made(users))
+    server, nodes = run(_made(users, standard))
     run(server.start())
     try:
         port = server.bserver._server.sockets[0].getsockname()[1]

@@ -82,6 +82,21 @@ def answered(number: int, answer: Any) -> Any:
     return far.message_to_binary(struct_to_binary(answer), ua.MessageType.SecureMessage, number)
 
 
+def aborted(number: int) -> bytes:
+    """Return the chunk that ends the answer to a message, without an answer."""
+    from asyncua import ua
+    from asyncua.common.connection import SecureConnection, TransportLimits
+    from asyncua.crypto.security_policies import SecurityPolicyNone
+    from asyncua.ua.ua_binary import struct_to_binary
+
+    far = SecureConnection(SecurityPolicyNone(), TransportLimits())
+    far.security_token.ChannelId, far.security_token.TokenId = 7, 13
+    far._sequence_number = number - 1
+    why = ua.ErrorMessage(ua.StatusCode(ua.StatusCodes.BadResponseTooLarge), "too large")
+    whole = far.message_to_binary(struct_to_binary(why), ua.MessageType.SecureMessage, number)
+    return bytes(whole[:3] + b"A" + whole[4:])
+
+
 def fault(number: int, name: str) -> Any:
     """Return the answer to a message that refuses it whole with a status code."""
     from asyncua import ua

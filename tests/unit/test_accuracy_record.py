@@ -173,6 +173,24 @@ def test_what_was_not_made_alike_is_not_pooled():
     assert pooled_look([fit(n) for n in range(9)], LooksAlike("", "n-angle")) is None
 
 
+def test_past_calibrations_are_read_where_a_station_can_use_them_and_not_else():
+    kept = [fit(n) for n in range(9)]
+    asked = []
+
+    def recall(*, kinds):
+        asked.extend(kinds)
+        return iter(kept if kinds == (EntryKind.CALIBRATION,) else ())
+
+    nowhere = facts_at(
+        CellRecord(recall), station="", stated={}, alike=LooksAlike("", "n-angle"), learnt=False
+    )
+    assert nowhere.look_sigma_mm is None
+    assert EntryKind.CALIBRATION not in asked
+    there = facts_at(CellRecord(recall), station="PIN-07", stated={}, alike=ALIKE, learnt=False)
+    assert there.look_sigma_mm == pytest.approx(0.01)
+    assert EntryKind.CALIBRATION in asked
+
+
 def row_entry(for_station="", half_width=0.03, spoilt=()):
     found = MeasuredRow(
         row="touch_mm", half_width=half_width, by="artefact-test", station=for_station

@@ -193,7 +193,7 @@ def test_a_beat_that_cannot_be_stored_raises_nothing(leases, monkeypatch):
     anna.begin(marker("a"))
     leases.clock.advance(2)
 
-    def fail(*_told):
+    def fail(*_told, **_room):
         raise JournalError("The disk is full.")
 
     monkeypatch.setattr(leases.journal._store, "write", fail)

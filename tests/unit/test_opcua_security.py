@@ -1,14 +1,22 @@
 """A signed and encrypted session, to the server whose certificate was kept and to no other."""
 
+import warnings
 from contextlib import closing
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509.oid import NameOID
 
 from robolink.errors import ConfigError, LoginRefusedError, RejectedError
 from robolink.transport import parse_url
 from robolink.transport.opcua.opening import open_client
 from robolink.transport.opcua.security import OpcuaSecurity
+from robolink.transport.opcua.server_certificate import read_server_certificate
 from robolink.transport.opcua.session import _user_token
 from tests.unit._opcua_far_end import FarEnd, own, symbol
 
@@ -95,3 +103,25 @@ def test_a_password_goes_by_an_encryption_that_is_known_or_not_at_all(second: st
 def test_less_than_was_asked_for_is_refused_by_name(opcua_served: FarEnd) -> None:
     with pytest.raises(RejectedError, match=r"no signed and encrypted.*Basic256Sha256 Sign"):
         opened(opcua_served, replace(security(), policy="Aes128Sha256RsaOaep"))
+
+
+def test_a_certificate_with_an_empty_country_is_read_without_a_warning() -> None:
+    """As that of Eclipse Milo; a warning of Python would stand between a person's lines."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        country = x509.NameAttribute(NameOID.COUNTRY_NAME, "", _validate=False)
+    named = x509.Name([country, x509.NameAttribute(NameOID.COMMON_NAME, "Milo")])
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(named)
+        .issuer_name(named)
+        .public_key(key.public_key())
+        .serial_number(1)
+        .not_valid_before(datetime(2026, 1, 1, tzinfo=UTC))
+        .not_valid_after(datetime(2027, 1, 1, tzinfo=UTC))
+        .sign(key, hashes.SHA256())
+    )
+    with pytest.warns(UserWarning, match="length"):  # else this shows nothing
+        _ = x509.load_der_x509_certificate(certificate.public_bytes(Encoding.DER)).subject
+    assert read_server_certificate(certificate.public_bytes(Encoding.DER), "plc").name == "Milo"

@@ -3,12 +3,19 @@
 import platform
 import stat
 import threading
+from base64 import encodebytes
 from datetime import timedelta
 
 import pytest
 from cryptography import x509
-from cryptography.hazmat.primitives.asymmetric import rsa
-from cryptography.hazmat.primitives.serialization import load_pem_private_key
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import padding, rsa
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    NoEncryption,
+    PrivateFormat,
+    load_pem_private_key,
+)
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from robolink.errors import ConfigError
@@ -124,6 +131,35 @@ def test_one_that_others_can_read_or_that_is_damaged_is_refused_and_not_replaced
             own.own_certificate()
         assert RemedyWord.RENEW_CERTIFICATE in told.value.remedy
         assert made.path.read_bytes() == spoilt
+
+
+def test_of_a_damaged_key_nothing_is_used_that_does_not_fit_its_certificate():
+    """Each bit that turns is refused by name, or leaves a key that works as before."""
+    made = own.own_certificate()
+    certificate = x509.load_der_x509_certificate(made.der)
+    key = load_pem_private_key(made.key, None)
+    der = key.private_bytes(Encoding.DER, PrivateFormat.PKCS8, NoEncryption())
+    public_key = certificate.public_key()
+    assert isinstance(public_key, rsa.RSAPublicKey)
+    oaep = padding.OAEP(padding.MGF1(hashes.SHA256()), hashes.SHA256(), None)
+    sealed = public_key.encrypt(b"nonce", oaep)
+    ended = set()
+    for bit in range(3, 8 * len(der), 397):
+        bent = bytearray(der)
+        bent[bit // 8] ^= 1 << bit % 8
+        wrapped = encodebytes(bent)
+        pem = b"-----BEGIN PRIVATE KEY-----\n" + wrapped + b"-----END PRIVATE KEY-----\n"
+        made.path.write_bytes(pem + certificate.public_bytes(Encoding.PEM))
+        try:
+            found = own.own_certificate()
+        except ConfigError as error:
+            ended.add(error.what.replace(str(made.path), "it"))
+            continue
+        used = load_pem_private_key(found.key, None, unsafe_skip_rsa_key_validation=True)
+        assert isinstance(used, rsa.RSAPrivateKey)
+        assert used.decrypt(sealed, oaep) == b"nonce", bit
+        ended.add("works")
+    assert ended == {"it holds no certificate with its key.", "works"}
 
 
 @pytest.mark.parametrize("days", [-1, own.VALID_DAYS + 1])

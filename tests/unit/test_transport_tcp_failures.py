@@ -114,6 +114,24 @@ def test_a_failed_connection_says_what_happened_and_what_to_do(sockets, error, s
     assert made.closed
 
 
+@pytest.mark.parametrize(
+    ("scheme", "server"),
+    [
+        ("epson+tcp", "remote control"),
+        ("softmotion+modbus-tcp", "the Modbus server"),
+        ("plc+opcua", "the OPC UA server"),
+    ],
+)
+def test_a_port_without_a_server_is_told_with_the_server_that_belongs_there(
+    sockets, scheme, server
+):
+    sockets(ConnectionRefusedError(errno.ECONNREFUSED, "refused"))
+    url = parse_url(f"{scheme}://192.0.2.1:5000")
+    with pytest.raises(ConnectError) as caught:
+        dial(url, timeout_s=3, deadline=Deadline.after(FakeClock(), 3))
+    assert f"that {server} is switched on" in caught.value.remedy
+
+
 def test_an_unknown_host_name_is_named(monkeypatch):
     def look_up(*arguments, **options):
         raise socket.gaierror(socket.EAI_NONAME, "unknown")

@@ -84,6 +84,20 @@ class Server:
         self.process.send_signal(2)
         self.process.wait(timeout=_START_S)
 
+    @contextmanager
+    def closed(self, url: str) -> Iterator[None]:
+        """Cut the connections to a database, which takes none during the block."""
+        name = url.rpartition("/")[2]
+        asked(self.url(), f"ALTER DATABASE {name} ALLOW_CONNECTIONS false")
+        asked(
+            self.url(),
+            f"SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = '{name}'",
+        )
+        try:
+            yield
+        finally:
+            asked(self.url(), f"ALTER DATABASE {name} ALLOW_CONNECTIONS true")
+
     def crash(self) -> None:
         """End it at once, so that it recovers at its next start."""
         assert self.process is not None

@@ -151,7 +151,10 @@ def test_killed_at_each_durable_step_one_journal_is_in_force(request, tmp_path):
     assert in_force == ["old"] * 3 + ["new"] * 4
 
 
-@pytest.mark.parametrize(("way", "seal"), [(TO_SERVER, 6), (FROM_SERVER, 5)])
+@pytest.mark.parametrize(
+    ("way", "seal"),
+    [pytest.param(TO_SERVER, 6, marks=pytest.mark.soak), (FROM_SERVER, 5)],
+)
 def test_killed_before_and_after_the_seal_one_journal_is_in_force(request, tmp_path, way, seal):
     steps = (seal, seal + 1)
     in_force = [*killed_everywhere(request, tmp_path, ("commit",), way, steps)]

@@ -111,11 +111,12 @@ def test_whose_an_address_is():
     assert network_of("testclient") == "testclient"
 
 
-def test_ten_thousand_connections_keep_no_stop_waiting(panel):
+@pytest.mark.parametrize("count", [2500, pytest.param(10_000, marks=pytest.mark.soak)])
+def test_thousands_of_connections_keep_no_stop_waiting(panel, count):
     tablet = panel.browser().load()
     worst_s = 0.0
     with ExitStack() as stack, tablet.live() as stream:
-        for number in range(10_000):
+        for number in range(count):
             stack.enter_context(silent(panel))
             if number % 250 == 249:
                 begun_s = time.monotonic()
@@ -129,7 +130,7 @@ def test_ten_thousand_connections_keep_no_stop_waiting(panel):
         assert len(panel.access.connections) <= MOST
         assert sum(is_closed(line, 0.1) for line in held) >= 200 - STRANGERS
         assert stream.ask(t="stop", press="last")["t"] == "carried out"
-    assert panel.access.connections.refused >= 9_000
+    assert panel.access.connections.refused >= 0.9 * count
     assert worst_s < 2.0
 
 

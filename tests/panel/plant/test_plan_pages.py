@@ -53,7 +53,7 @@ def eventually(holds, within_s=8.0):
     until_s = time.monotonic() + within_s
     while not (found := holds()):
         assert time.monotonic() < until_s, "it did not come to pass"
-        time.sleep(0.05)
+        time.sleep(0.2)
     return found
 
 

@@ -8,7 +8,13 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.softmotion.mailbox.image import arranged
 
 from robolink.controllers import SoftMotionController, open_softmotion
-from robolink.errors import ConnectError, RobolinkError, TransportClosedError, TransportTimeoutError
+from robolink.errors import (
+    ConnectError,
+    RejectedError,
+    RobolinkError,
+    TransportClosedError,
+    TransportTimeoutError,
+)
 from robolink.journal import memory_journal
 from robolink.model import Signature, new_operation
 from robolink.protocols.mailbox import RESPONSE, SLOT, WordOrder, encode_slot
@@ -75,6 +81,20 @@ class PlcLink:
 
         self.plan(method, mishap, nth=nth)
 
+    def refuse(self, method: str) -> None:
+        """Let the next request be refused in an answer, which closes no link."""
+
+        def mishap(_deliver: Callable[[], T]) -> T:
+            raise RejectedError("busy", remedy="wait", code=6)
+
+        self.plan(method, mishap)
+
+    def hold_up(self, method: str) -> Callable[[], None]:
+        """Let the PLC notice the next request only when what is returned is called."""
+        held: list[Callable[[], Any]] = []
+        self.plan(method, held.append)
+        return lambda: held.pop()()
+
     def before(self, method: str, act: Callable[[], object], *, nth: int = 1) -> None:
         """Run something just before the nth request arrives."""
 
@@ -93,8 +113,9 @@ class PlcLink:
         self.closed = not self.recovers
         return TransportTimeoutError("no answer", remedy="look")
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """Write the command block."""
+        admit()
         changed = self.command(tuple(words))
         self.sent.append(tuple(words))
         self._exchange("write_command", lambda: self.plc.receive(changed))

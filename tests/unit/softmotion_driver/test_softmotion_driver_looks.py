@@ -232,7 +232,7 @@ def test_a_snapshot_from_before_a_command_belongs_to_no_step(controller):
     """What the command changes is not in it, however young it is."""
     snapshots, wire = controller._mailbox.snapshots, controller._mailbox.wire
     snapshots.take()
-    wire.write([0] * 64)
+    wire.write([0] * 64, lambda: None)
     assert snapshots.of_this_step() is None
 
 

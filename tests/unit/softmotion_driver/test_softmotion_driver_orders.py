@@ -6,6 +6,7 @@ from itertools import count
 import pytest
 
 from robolink.controllers.softmotion import answers
+from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -13,11 +14,14 @@ from robolink.errors import (
     OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportBrokenError,
+    TransportClosedError,
     TransportTimeoutError,
 )
 from robolink.model import Act, Verdict
 from robolink.protocols.mailbox import (
+    COMMAND_WORDS,
     Bits,
     Command,
     CommandState,
@@ -290,6 +294,93 @@ def test_a_stop_that_is_not_confirmed_names_the_emergency_stop(plc, controller):
     with pytest.raises(TransportTimeoutError) as failure:
         controller.stop()
     assert "emergency stop" in failure.value.remedy
+
+
+def test_a_stop_is_confirmed_where_the_plc_takes_the_command_before_it_late(cell, plc, controller):
+    """Its cycle came between the stop's own look and its block; that is no other client."""
+    for _ in range(3):
+        cell.link.refuse("read_head")
+    take_the_output = cell.link.hold_up("write_command")
+    with pytest.raises(OutcomeUnknownError, match="may or may not have run"):
+        controller.io.set_output(5, 1)
+    cell.link.before("read_head", take_the_output)
+    take_the_stop = cell.link.hold_up("write_command")
+    cell.link.before("read_head", take_the_stop)
+    controller.stop()
+    assert plc.opcodes() == [Opcode.WRITE_OUTPUT, Opcode.STOP]
+    assert plc.now.group_state == GroupState.STOPPING
+
+
+def test_a_stop_that_only_an_earlier_command_answers_is_not_confirmed(cell, plc, controller):
+    for _ in range(3):
+        cell.link.refuse("read_head")
+    take_the_output = cell.link.hold_up("write_command")
+    with pytest.raises(OutcomeUnknownError):
+        controller.io.set_output(5, 1)
+    cell.link.before("read_head", take_the_output)
+    cell.link.hold_up("write_command")
+    with pytest.raises(TransportTimeoutError, match="not acknowledged") as unconfirmed:
+        controller.stop()
+    assert "press the emergency stop" in unconfirmed.value.remedy
+    assert plc.opcodes() == [Opcode.WRITE_OUTPUT]
+
+
+REFUSED, LOST = PlcLink.refuse, PlcLink.lose_answer
+
+
+@pytest.mark.parametrize(
+    "looks",
+    [
+        (REFUSED, REFUSED, REFUSED),
+        (LOST, REFUSED, REFUSED, REFUSED),
+        (REFUSED, REFUSED, LOST, REFUSED),
+        (LOST, REFUSED, LOST, REFUSED, REFUSED),
+    ],
+    ids=lambda looks: "-".join(look.__name__ for look in looks),
+)
+def test_looks_that_are_refused_leave_a_serial_line_for_the_stop(cell, plc, controller, looks):
+    """Each of them is an answer: the line has found its place again, whatever was lost before."""
+    cell.link.recovers = True
+    controller.io.read_input(3)
+    for look in looks:
+        look(cell.link, "read_response")
+    with pytest.raises(RemoteProtocolError, match="busy"):
+        controller.status()
+    controller.stop()
+    assert plc.now.group_state == GroupState.STOPPING
+
+
+@pytest.mark.parametrize(
+    ("recovers", "looks"),
+    [(False, (REFUSED, LOST)), (True, (LOST, REFUSED, LOST, REFUSED, LOST))],
+    ids=["network", "serial"],
+)
+def test_looks_that_nothing_answers_end_the_session_although_others_were_refused(
+    cell, plc, controller, recovers, looks
+):
+    cell.link.recovers = recovers
+    controller.io.read_input(3)
+    for look in looks:
+        look(cell.link, "read_response")
+    with pytest.raises(TransportTimeoutError):
+        controller.status()
+    with pytest.raises(TransportClosedError):
+        controller.status()
+    assert cell.link.closed
+
+
+def test_a_block_that_a_stop_held_back_was_not_sent(cell):
+    wire = MailboxWire(cell.link, owner=7, timeout_s=0.5)
+
+    def stopped():
+        raise StoppedError("stopped", remedy="release it")
+
+    with pytest.raises(StoppedError):
+        wire.write((0,) * COMMAND_WORDS, stopped)
+    assert (wire.commands, wire.exchanges) == (0, 0)
+    cell.link.refuse("read_response")
+    with pytest.raises(RejectedError):
+        wire.read_response()
 
 
 def test_an_error_that_stays_after_the_reset_is_told(cell, plc, controller):

@@ -117,7 +117,7 @@ def test_the_response_stands_between_two_counts_of_cycles(owned):
         assert words == program.value("response")
 
 
-@pytest.mark.parametrize("profile", ["tools", "full"])
+@pytest.mark.parametrize("profile", ["tools", pytest.param("full", marks=pytest.mark.soak)])
 def test_the_simulator_runs_an_exported_one_from_its_folder(tmp_path, profile):
     folder = tmp_path / "plc"
     argv = ["plc", "export", str(folder), "--profile", profile, "--opcua"]

@@ -1,7 +1,7 @@
 """A link to a PLC's mailbox on which the adversary sees all traffic, on any carrier."""
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final, Protocol
@@ -152,7 +152,7 @@ class TappedMailboxLink(MailboxLinkAround):
         self._seen = SeenSession()
         self._last = SentKind.OTHER
 
-    def write_command(self, words: Sequence[int]) -> None:
+    def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
         forbidden = self._seen.written(words, self._plant.rejected)
         sent = replace(_classified(words), forbidden=forbidden)
@@ -160,7 +160,7 @@ class TappedMailboxLink(MailboxLinkAround):
         self._last = sent.kind
         self._plant.announce(sent.text, words)
         with self._cut_off_noted():
-            self._inner.write_command(words)
+            self._inner.write_command(words, admit)
         self._tap.passed(self._process, f"wire sent {sent.text}")
 
     def read_head(self) -> MailboxHead:

@@ -13,6 +13,7 @@ from robolink import runtime
 from robolink.errors import (
     Concerning,
     ConnectError,
+    LoginRefusedError,
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
@@ -91,6 +92,11 @@ def stop_now(
             return status
         except (TransportError, RemoteProtocolError) as error:
             if isinstance(error, ConnectError) or not tries_left:
+                raise
+        except RejectedError as error:
+            # A PLC that is busy for a moment refuses a look. A password is never tried again.
+            by_mailbox = link.kind == "softmotion" and not isinstance(error, LoginRefusedError)
+            if not by_mailbox or not tries_left:
                 raise
     raise AssertionError  # the last try returns or raises
 

@@ -1,6 +1,7 @@
 """Which controller a log is about: its own answer, and the record of that."""
 
 import re
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -199,6 +200,7 @@ class Meetings:
 
     def __init__(self) -> None:
         self._met: list[_Gathered] = []
+        self._lock = threading.Lock()
 
     @contextmanager
     def gathered(self, called: str) -> Iterator[None]:
@@ -215,14 +217,16 @@ class Meetings:
 
     def add(self, met: _Gathered) -> None:
         """Keep one until it is recorded."""
-        self._met.append(met)
+        with self._lock:
+            self._met.append(met)
 
     def record(self) -> Iterator[tuple[str, str]]:
         """Record those that wait; yield what a person should know once, and of whom.
 
         What cannot be recorded fails nothing else: that controller is asked again next time.
         """
-        waiting, self._met = self._met, []
+        with self._lock:
+            waiting, self._met = self._met, []
         for store in dict.fromkeys(one.store for one in waiting):
             yield from _stored(store, [one for one in waiting if one.store is store])
 

@@ -221,6 +221,16 @@ def test_a_beat_that_is_refused_holds_no_stop_back():
         assert cell.simulator.faults.times_fired > 1
 
 
+def test_looks_that_are_refused_for_a_moment_hold_no_stop_back():
+    busy = PlcFaultAction.MODBUS_EXCEPTION
+    with served_plc("modbus-tcp") as cell:
+        for exchange in range(1, 5):
+            cell.simulator.faults.add(PlcFault(busy, match="read_", code=6, on_exchange=exchange))
+        stop_now(cell.url)
+        assert set(cell.commands) == {"STOP"}
+        assert cell.simulator.faults.times_fired == 4
+
+
 def test_a_group_that_is_disabled_is_stopped_without_an_error(plc):
     with plc.connect() as controller:
         controller.motors(False)

@@ -23,6 +23,7 @@ from robolink.errors import (
     ControllerFaultError,
     LimitError,
     OutcomeUnknownError,
+    RemoteProtocolError,
     RobolinkError,
     StoppedError,
     TransportTimeoutError,
@@ -257,7 +258,7 @@ class JogWatch:
         for draft in (self._end_draft, *_STRONGER):
             try:
                 self._mailbox.commands.carry_out(draft)
-            except (ControllerError, TransportTimeoutError) as error:
+            except (ControllerError, TransportTimeoutError, RemoteProtocolError) as error:
                 if not self._mailbox.wire.alive:
                     raise
                 refusal = refusal or error

@@ -19,7 +19,8 @@ a log that readers or a full disk kept from its restart for 4,062 frames.
 """
 
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -101,12 +102,18 @@ class LogReserve:
         SQLite does so by itself after some 200 frames. On a full disk the log may be shorter than
         that and have no room left but for ends, while a job goes on and gives signs of life.
         """
-        wait_ms = self._pragma("busy_timeout")
-        self._driver.execute("PRAGMA busy_timeout=0")
-        try:
+        with self.unwaiting():
             ((busy, *_),) = self._driver.execute("PRAGMA wal_checkpoint(RESTART)").fetchall()
             if not busy:  # so the next frame is the first, whoever writes it
                 self._write_page()
+
+    @contextmanager
+    def unwaiting(self) -> Iterator[None]:
+        """Within the block, fail at once where another program keeps the file locked."""
+        wait_ms = self._pragma("busy_timeout")
+        self._driver.execute("PRAGMA busy_timeout=0")
+        try:
+            yield
         finally:
             self._driver.execute(f"PRAGMA busy_timeout={wait_ms}")
 

@@ -323,22 +323,24 @@ class Store:
             try:
                 tables = self._connected(to_write=writing)
                 connection = tables.connection
-                if writing and connection.begin_writing:
-                    connection.run(connection.begin_writing)
-                if leaves and connection.reserve is not None:
-                    connection.reserve.begin()
                 try:
+                    if writing and connection.begin_writing:
+                        connection.run(connection.begin_writing)
+                    if leaves and connection.reserve is not None:
+                        connection.reserve.begin()
                     yield tables
-                except BaseException:
-                    connection.roll_back()
-                    raise
-                if writing:
                     if leaves:
                         _keep_room(tables, leaves)
-                    connection.commit()
-                    self._grown = tables.entries.take_added() or self._grown
-                else:
-                    connection.roll_back()
+                    if writing:
+                        connection.commit()
+                    else:
+                        connection.roll_back()
+                except BaseException:  # Ctrl-C between two statements too
+                    tables.entries.take_added()
+                    with suppress(*self._failures):
+                        connection.roll_back()
+                    raise
+                self._grown = tables.entries.take_added() or self._grown
             except JournalError as error:
                 self._leave(error)
                 raise
@@ -402,7 +404,8 @@ class Store:
     def _keep_again(self, tables: Tables) -> None:
         """Keep room for the ends of open jobs, which may have gone with an earlier connection.
 
-        Where that fails, the next write says why.
+        Where that fails, the next write says why. Nobody waits for another writer here: this may be
+        a look.
         """
         connection = tables.connection
         if connection.reserve is None:
@@ -410,7 +413,8 @@ class Store:
         with suppress(*self._failures):
             if tables.markers.controllers(1):
                 try:
-                    connection.run(connection.begin_writing)
+                    with connection.reserve.unwaiting():
+                        connection.run(connection.begin_writing)
                     connection.reserve.begin()
                     _keep_room(tables, END_FRAMES)
                 finally:

@@ -7,6 +7,7 @@ made longer. A real small disk, filled at each step, is in ``tests/fleet/test_fu
 import gc
 import shutil
 import sqlite3
+import time
 import warnings
 from contextlib import closing, contextmanager, nullcontext
 from itertools import count
@@ -17,7 +18,7 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink.errors import JournalError
 from robolink.journal import move_journal
 from robolink.journal._places import place_of
-from robolink.journal.store.reserve import END_FRAMES, JOB_FRAMES, MOST_JOBS
+from robolink.journal.store.reserve import END_FRAMES, JOB_FRAMES, MOST_JOBS, LogReserve
 from robolink.journal.store.store import Store
 from robolink.model import EntryKind, MarkerKind, NewCheck, NewEntry
 from tests.contract.journal._acts import marker
@@ -220,6 +221,35 @@ def test_a_connection_that_was_given_up_keeps_the_room_again(path, open_anew):
     with full(path):
         log.clear("a", LONG, LONG)
     assert log.open_markers() == ()
+
+
+def test_ctrl_c_while_room_is_kept_leaves_no_transaction_open(path, open_anew, monkeypatch):
+    journal = open_anew(str(path))
+    log = journal.log("cell")
+    log.begin(marker("one"))
+    keep = LogReserve.keep
+
+    def interrupted(reserve, frames):
+        monkeypatch.setattr(LogReserve, "keep", keep)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(LogReserve, "keep", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        log.append(NewEntry(EntryKind.RAW))
+    run_beside(path, "CREATE TABLE others (here INTEGER)")
+    assert journal.verify().problems == ()
+    log.clear("one", LONG)
+    assert log.open_markers() == ()
+
+
+def test_a_look_waits_for_no_other_writer(path, open_anew):
+    log = open_anew(str(path)).log("cell")
+    log.begin(marker("one"))
+    with closing(sqlite3.connect(path, isolation_level=None)) as writer:
+        writer.execute("BEGIN IMMEDIATE")
+        begun_s = time.monotonic()
+        assert open_anew(str(path)).log("cell").open_markers()
+        assert time.monotonic() - begun_s < 1.5  # a write waits 3 s
 
 
 SMALL = "INSERT INTO filler SELECT value || '', randomblob(1900) FROM numbers"

@@ -190,9 +190,9 @@ def _page(text):
     return HTMLResponse(text, headers={"Content-Security-Policy": CONTENT_SECURITY})
 
 
-def until(holds, within_s=15.0):
-    """Wait until something holds; fail where it does not."""
+def until(holds, within_s=15.0, told=lambda: "nothing"):
+    """Wait until something holds; fail where it does not, with what the page told meanwhile."""
     end_s = time.monotonic() + within_s
     while not holds():
-        assert time.monotonic() < end_s, "it did not come to pass"
+        assert time.monotonic() < end_s, f"it did not come to pass; told: {told()}"
         time.sleep(0.01)

@@ -308,10 +308,13 @@ def test_stop_is_as_fast_with_twenty_tablets(cell, tablet):
     with ExitStack() as stack:
         for _ in range(19):
             stack.enter_context(watching(cell))
-        for _ in range(20):
+        for number in range(20):
             count, at_s = len(cell.relay.aborts), time.monotonic()
             fingers.down("#stop")
-            until(lambda count=count: len(cell.relay.aborts) > count)
+            until(
+                lambda count=count: len(cell.relay.aborts) > count,
+                told=lambda number=number: f"press {number}: {page.inner_text('#unstopped')}",
+            )
             took_ms.append(1000 * (cell.relay.aborts[count] - at_s))
             page.wait_for_selector("#stopped:visible")
             fingers.up()

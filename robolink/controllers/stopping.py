@@ -44,6 +44,7 @@ def stop_now(
     *,
     password: "str | Secret | None" = None,
     timeout_s: float = 3.0,
+    login_s: float | None = None,
     clock: "Clock | None" = None,
     trace: "TraceSink | None" = None,
     met: "Callable[[str], None] | None" = None,
@@ -57,6 +58,8 @@ def stop_now(
         url: Which controller. One that is open already is stopped over the link that it has.
         password: An EPSON controller's remote password, if one is set, or that of an OPC UA user.
         timeout_s: Longest wait for the connection, and for one answer.
+        login_s: Longest wait for an EPSON controller's answer to the login, which it gives to one
+            client; ``timeout_s`` if that is shorter, or this is not given.
         clock: Replaces the machine's clock; a simulator brings its own.
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but a
             password; see :func:`robolink.connect`.
@@ -83,7 +86,8 @@ def stop_now(
     kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
     stop = kinds.get(link.kind, _stop_other)
     given = password if isinstance(password, str) else password.reveal() if password else ""
-    means = _Means(given, timeout_s, clock, met, runtime.random_number(32))
+    patience_s = timeout_s if login_s is None else min(login_s, timeout_s)
+    means = _Means(given, timeout_s, patience_s, clock, met, runtime.random_number(32))
     for tries_left in reversed(range(_TRIES)):
         try:
             with told_to(trace):
@@ -126,6 +130,7 @@ class _Means(NamedTuple):
 
     password: str
     timeout_s: float
+    login_s: float
     clock: "Clock | None"
     met: "Callable[[str], None] | None"
     owner: int
@@ -138,10 +143,11 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.controllers.epson.rest import bring_to_rest
 
     opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock)
-    talk = EpsonConversation(opened, timeout_s=means.timeout_s)
+    talk = EpsonConversation(opened, timeout_s=means.login_s)
     try:
         with Concerning(talk.identity):
             talk.login(means.password)
+            talk.timeout_s = means.timeout_s
             now = bring_to_rest(talk.exchange, talk.clock, controller=talk.identity)
             from robolink.controllers.epson.answers import may_log_out, status_from_flags
 

@@ -38,6 +38,7 @@ from robolink_cli.session.stop_listener import (
     remember_address,
     watched_at_desk,
 )
+from robolink_cli.stopping.stop_first import OPENED_ONCE
 
 if TYPE_CHECKING:
     from robolink.config import Expected
@@ -46,9 +47,6 @@ if TYPE_CHECKING:
 
 LONGEST_CHECK_S: Final = 10.0
 """Longest time for which a check of cells has one of them, in s."""
-
-_OPENED_ONCE = ("+serial:", "+modbus-rtu:", "+can:")
-"""Schemes of lines that serve one process of a computer."""
 
 
 @contextmanager
@@ -190,7 +188,7 @@ def _naming_the_holder(url: str, connect: "Callable[[], Controller]") -> "Contro
     try:
         return connect()
     except ConnectError as error:
-        opened_once = any(medium in url for medium in _OPENED_ONCE)
+        opened_once = any(medium in url for medium in OPENED_ONCE)
         if not opened_once and not isinstance(error, LoginUnansweredError):
             raise
         from robolink_cli.session.take_over import name_holder  # it is nearly always free

@@ -6,10 +6,14 @@ that has the controller is asked to stop it, where it is the only one who can; a
 serves several clients, so there the stop goes out directly and that process hears of it then.
 """
 
+import errno
 import os
 import re
+import time
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, field
+from itertools import tee
 from typing import TYPE_CHECKING, Final
 
 from robolink.controllers import stop_now
@@ -27,6 +31,17 @@ from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:
     from robolink.transport import Direction
+
+OPENED_ONCE: Final = ("+serial:", "+modbus-rtu:", "+can:")
+"""Schemes of lines that serve one process of a computer."""
+
+_GIVES_WAY_S: Final = (0.5, 1.0)
+"""Times in s for which a stop tries whether the only place is free, before it waits as long as for
+any answer: who only looks has it for a moment, and a login beside it may never be answered, also
+when the place is free again (docs/reference/epson.md 1.1)."""
+
+_IN_USE: Final = (errno.EAGAIN, errno.EBUSY)
+"""What a system says of a port that another process has locked."""
 
 _USER_OF_OPC_UA: Final = re.compile(r"\+opcua://.*[?&]user=")
 
@@ -111,11 +126,14 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
         outcome.doubts += [reach.doubt] if reach.doubt else []
     outcome.keys = far_end_of(outcome.url)
     several = serves_several(outcome.url)
+    (passwords,) = tee(_passwords(outcome, password_file, password_env), 1)
     refusals: list[RobolinkError] = []
     if not several and _through_holder(request, outcome, refusals):
         return
     try:
-        _directly(request, outcome, password_file, password_env)
+        if not several and not refusals and _as_soon_as_free(request, outcome, refusals, passwords):
+            return
+        _directly(request, outcome, passwords)
     except RobolinkError as error:
         again = several or isinstance(error, ConnectError)
         if again and _through_holder(request, outcome, refusals, also=_last_known(outcome.url)):
@@ -127,6 +145,44 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
     else:
         # Inform a process that has it locked by another address, such as a PLC's network address.
         _through_holder(request, outcome)
+
+
+def _as_soon_as_free(
+    request: StopRequest,
+    outcome: StopOutcome,
+    refusals: list[RobolinkError],
+    passwords: Iterator[str],
+) -> bool:
+    """Stop what serves one client, which may be one that has it for a moment only.
+
+    Returns:
+        Whether it was stopped; if not, it is to be tried once more, for as long as for any answer.
+
+    Raises:
+        RobolinkError: As from one attempt, but that the place is taken.
+    """
+    is_line = any(line in outcome.url for line in OPENED_ONCE)
+    for patience_s in _GIVES_WAY_S:
+        until_s = time.monotonic() + patience_s
+        try:
+            _directly(request, outcome, passwords, login_s=None if is_line else patience_s)
+        except ConnectError as error:
+            if not (_is_in_use(error) if is_line else isinstance(error, LoginUnansweredError)):
+                raise
+        else:
+            _through_holder(request, outcome)
+            return True
+        time.sleep(max(0.0, until_s - time.monotonic()))
+        if _through_holder(request, outcome, refusals):
+            return True
+        if refusals:
+            break
+    return False
+
+
+def _is_in_use(error: ConnectError) -> bool:
+    """Whether a line could not be opened because another process has it."""
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno in _IN_USE
 
 
 def _left(error: BaseException) -> bool:
@@ -190,23 +246,40 @@ def _through_holder(
     return False
 
 
-def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: str) -> None:
+def _directly(
+    request: StopRequest,
+    outcome: StopOutcome,
+    passwords: Iterator[str],
+    *,
+    login_s: float | None = None,
+) -> None:
+    """Stop the controller from this process.
+
+    Args:
+        request: What was asked for.
+        outcome: Takes what becomes of it.
+        passwords: Those to try, asked for once; one that is refused is taken from them.
+        login_s: Longest wait for the answer to a login; as for any other if not given.
+    """
+
     def met(name: str) -> None:
         outcome.controller = name
 
     kept = request.record or request.log_file
     refused: LoginRefusedError | None = None
-    for password in _passwords(outcome, file, variable):
+    for password in copy(passwords):
         try:
             status = stop_now(
                 outcome.url,
                 password=password,
                 timeout_s=request.timeout_s,
+                login_s=login_s,
                 trace=(lambda *passage: outcome.heard.append(passage)) if kept else None,
                 met=met,
             )
         except LoginRefusedError as error:
             refused = refused or error
+            next(passwords)
             continue
         outcome.state = str(status.state)
         return

@@ -7,7 +7,11 @@ from robolink.errors import (
     ControllerError,
     ControllerFaultError,
     HeartbeatLostError,
+    OutcomeUnknownError,
     RejectedError,
+    RemoteProtocolError,
+    TransportTimeoutError,
+    UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
@@ -162,6 +166,57 @@ def motion_failure(request: str, now: Response, error_class: int) -> ControllerE
         remedy=_remedy(error_class)
         if error_class == ErrorClass.HEARTBEAT_LOST
         else tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
+    )
+
+
+def silence(said: str) -> TransportTimeoutError:
+    """Return the error for a command of which the PLC does not show what was expected."""
+    return TransportTimeoutError(
+        said,
+        remedy=tr("Look at the PLC; the command may still be carried out."),
+    )
+
+
+def unseen_end(command: Command) -> UnclearAnswerError:
+    """Return the error for a command behind which a stop was taken before its end was read.
+
+    The list of ended commands only keeps those that a stop ended; the end of an earlier one, good
+    or bad, is no longer shown (docs/reference/mailbox.md, "When a command counts").
+    """
+    return UnclearAnswerError(
+        tr(
+            "A stop came before robolink read the end of {request!r}.",
+            request=describe(command),
+        ),
+        remedy=tr("Check what it should have changed."),
+    )
+
+
+def overtaken(command: Command, now: Response) -> RemoteProtocolError:
+    """Return the error for a command in whose place another client's was acknowledged."""
+    return RemoteProtocolError(
+        tr(
+            "The PLC acknowledged command {number} of another client ({owner:08X}) in place of "
+            "{request!r}.",
+            number=now.ack_head,
+            owner=now.ack_owner,
+            request=describe(command),
+        ),
+        remedy=tr("Find the other client; only one at a time may command this mailbox."),
+    )
+
+
+def unconfirmed_stop(identity: str, seconds: float) -> OutcomeUnknownError:
+    """Return the error for a group that was told to stop and did not show that it rests."""
+    return OutcomeUnknownError(
+        tr(
+            "robolink sent {controller} the stop, but could not confirm within {seconds:g} s "
+            "that the robot has stopped.",
+            controller=identity,
+            seconds=seconds,
+        ),
+        remedy=tr("It may still be moving."),
+        request="Stop",
     )
 
 

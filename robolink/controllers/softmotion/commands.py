@@ -8,19 +8,22 @@ to somebody else in its place leaves it unknown. One to an earlier command of ou
 before it. A block is written again in one case only: the PLC counts one more damaged block and has
 not acknowledged ours. Never after a time-out.
 
-Bringing the axis group behind a mailbox to rest, and knowing that it rests.
+What only ends a movement may be repeated (docs/reference/stopping.md 1), and waits for no look: its
+block is built on the last snapshot of the session. It is written again also where the far end
+refuses to take it, and once, as a new command, where it got lost or is hidden behind another
+client's; a stop also where no look showed what became of it.
 
 Stop (opcode 2003) needs neither ownership nor the machine's permit (docs/reference/mailbox.md,
 "What ends by itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2).
-A group that is disabled, in error or held by an earlier stop refuses it, and may yet be braking, so
-there the axes themselves are compared.
+A group that is disabled, in error or held by an earlier stop refuses it and may yet be braking:
+there the axes are compared.
 """
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Final, TypeVar
 
 from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
@@ -34,7 +37,11 @@ from robolink.controllers.softmotion.answers import (
     is_in_its_place,
     is_own,
     motion_failure,
+    overtaken,
     refused,
+    silence,
+    unconfirmed_stop,
+    unseen_end,
 )
 from robolink.controllers.softmotion.ownership import Bystanders, Ownership
 from robolink.controllers.softmotion.snapshots import Snapshots
@@ -43,12 +50,9 @@ from robolink.errors import (
     Concerning,
     ConfigError,
     ControllerError,
-    OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
     StoppedError,
-    TransportTimeoutError,
-    UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
@@ -103,9 +107,8 @@ _CHANGE_NOTHING: Final = frozenset({Opcode.READ_INPUT, Opcode.READ_TOOL})
 
 _ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
 _LOOK_S: Final = 0.1
-_STILL: Final = 0.05
-"""Largest change of a stopped axis within :data:`_LOOK_S`, in its units: drives hold a position
-within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
+
+T = TypeVar("T")
 
 Require = Callable[[Response], None]
 """Raises for a snapshot that does not allow a command."""
@@ -119,6 +122,13 @@ COMPLETION_S: Final = 10.0
 _ACCEPTANCE_S: Final = 0.001
 """Shortest time in which a PLC usually accepts a block, in s: a part of its cycle. It is not asked
 before, but about a stop."""
+
+_AGAIN_S: Final = 0.04
+"""Time between two looks for a stop that was sent, the first of which was refused, in s."""
+
+_APART: Final = 64
+"""Least distance of the number of what only ends a movement from the last one that is known. The
+PLC takes a number up to 32767 above the last that it took, so that 250 lost ones do no harm."""
 
 _WRITES: Final = 3
 _OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
@@ -182,36 +192,60 @@ class CommandSender:
         """Send 2003 and return a snapshot that shows that the group has stopped.
 
         Raises:
-            RejectedError: The PLC knows no stop: its program moves nothing.
-            OutcomeUnknownError: The group does not come to rest within :data:`REST_S`.
+            RejectedError: The PLC knows no stop: its program moves nothing. Or nothing was sent,
+                because the far end refuses a stop, or showed no mailbox.
+            OutcomeUnknownError: The group does not come to rest, or refuses to show it, within
+                :data:`REST_S`.
             TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
         """
         snapshots, clock = self._snapshots, self._wire.clock
         deadline = Deadline.after(clock, REST_S)
+        restless = partial(unconfirmed_stop, self._wire.identity, REST_S)
+        shown = partial(self._shown, deadline=deadline)
         try:
-            done = self.stop()
-            now = snapshots.take()
+            try:
+                done = self.stop()
+            except RemoteProtocolError as refusal:
+                if not self._wire.alive:
+                    raise
+                shown(partial(snapshots.news, snapshots.latest), refusal=refusal)
+                done = shown(self.stop)
+            now = shown(snapshots.take)
             while not done(now):
                 if deadline.expired:
-                    raise self._restless()
-                now = snapshots.news(now)
+                    raise restless()
+                now = shown(partial(snapshots.news, now))
             # A stop from another thread ends ours before the group has stopped.
             stands = not now.bits & Bits.BUSY
         except RejectedError as error:
             if error.code not in _ALREADY:
                 raise
-            now, stands = snapshots.take(), False
+            now, stands = shown(snapshots.take), False
         # Imported here, because nothing may delay the frame of a stop (docs/reference/rules.md 5).
-        from robolink.controllers.softmotion.condition import is_moving
+        from robolink.controllers.softmotion.condition import has_stayed, is_moving
 
         while is_moving(now) or not stands:
             if deadline.expired:
-                raise self._restless()
+                raise restless()
             before, looked = now, Deadline.after(clock, _LOOK_S)
             while not looked.expired:
-                now = snapshots.news(now, wait_s=looked.remaining_s())
-            stands = stands or _still(before, now)
+                now = shown(partial(snapshots.news, now, wait_s=looked.remaining_s()))
+            stands = stands or has_stayed(before, now)
         return now
+
+    def _shown(
+        self, look: Callable[[], T], deadline: Deadline, refusal: RemoteProtocolError | None = None
+    ) -> T:
+        """Return what is shown behind a stop. No other waits for it: the lock is free."""
+        while refusal is None or not deadline.expired:
+            try:
+                return look()
+            except RemoteProtocolError as refused_look:
+                if not self._wire.alive:
+                    raise
+                refusal = refused_look
+            self._wire.clock.sleep(_AGAIN_S)
+        raise unconfirmed_stop(self._wire.identity, REST_S) from refusal
 
     def _taken(self, end: Ended) -> Response:
         """Return the snapshot of a finished command; raise for any other."""
@@ -287,11 +321,8 @@ class CommandSender:
         deadline = Deadline.after(self._wire.clock, COMPLETION_S)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
-                raise self._wire.ended(
-                    self._silence(
-                        tr("{request!r} began, and has not ended.", request=describe(command))
-                    )
-                )
+                said = tr("{request!r} began, and has not ended.", request=describe(command))
+                raise self._wire.ended(silence(said))
             now = self._snapshots.news(now, begun_ns=begun_ns)
         return end
 
@@ -303,12 +334,12 @@ class CommandSender:
         if has_taken(command, now):
             return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
         if now.ack_owner != command.owner:
-            raise self._wire.ended(self._overtaken(command, now))
+            raise self._wire.ended(overtaken(command, now))
         # Our own stop or halt, from another thread, was accepted after this command.
         ends = (end for end in now.finished if end.sequence == command.sequence)
         end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
         if end is None and command.opcode not in _OVERTAKEN:
-            raise self._unseen(command)
+            raise unseen_end(command)
         return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
 
     def _send(
@@ -328,7 +359,7 @@ class CommandSender:
             if ride:
                 self._wire.motions.begin(command.sequence)
             with in_doubt():
-                return command, self._accepted(command, before, words, ride=ride)
+                return self._accepted(command, before, words, ride=ride)
 
     def _admit(self, command: Command, *, ride: bool) -> None:
         """Refuse a block after a stop, and a movement after a Ctrl-C that is held back."""
@@ -339,23 +370,30 @@ class CommandSender:
 
     def _accepted(
         self, command: Command, before: Response, words: Words, *, ride: bool
-    ) -> Response:
-        """Write a block, and return the snapshot that acknowledges it."""
+    ) -> tuple[Command, Response]:
+        """Write a block; return it as it was acknowledged, with the snapshot that shows that."""
         admit = partial(self._admit, command, ride=ride)
-        for _ in range(_WRITES):
+        fresh = command.only_ends
+        for last in (*(False,) * (_WRITES - 1), True):
             try:
                 admit()  # before an error of the link can hide a stop; again as the block leaves
                 self._wire.write(words, admit)
-            except (RejectedError, StoppedError):
+            except (RejectedError, StoppedError) as error:
                 self._wire.motions.forget(command.sequence)
-                raise
+                if last or not command.only_ends or isinstance(error, StoppedError):
+                    raise
+                continue  # it was not done, and a stop may be repeated
+            again, fresh = fresh and not last, False
             try:
-                before, accepted = self._await_acknowledgement(command, before)
+                before, accepted = self._await_acknowledgement(command, before, again=again)
             except RejectedError:
                 self._wire.motions.forget(command.sequence)
                 raise
             if accepted:
-                return before
+                return command, before
+            if again:  # it may have been done unseen; then its number counts no more
+                command = self._addressed(command, before)
+                words = self._encode(command)
         raise self._wire.ended(
             RemoteProtocolError(
                 tr("{request!r} arrived damaged each time.", request=describe(command)),
@@ -367,7 +405,8 @@ class CommandSender:
         """Return the snapshot from before a command, which allows it (docs/reference/rules.md 1).
 
         It is taken under the lock, after the marker and after every other command of this client;
-        only the latch is asked between it and the block. No snapshot of before allows anything.
+        only the latch is asked between it and the block. No snapshot of before allows anything but
+        to end what moves.
         """
         before = self._before(draft)
         self._require_able(draft, before)
@@ -378,11 +417,11 @@ class CommandSender:
     def _before(self, draft: Command) -> Response:
         """Return a snapshot from before a command.
 
-        What ends a movement of ours on a slow line does not wait for one: whoever waited on the
-        movement has read the last one, and beats no more. What changes nothing needs none of its
-        own where this step has read one.
+        What only ends a movement waits for none in a session that has one: the PLC may refuse
+        looks, a gateway or a slow line may take long over them. What changes nothing needs none of
+        its own where this step has read one.
         """
-        if draft.only_ends and self._wire.motions.unfinished and self._wire.whole_look_s > 0:
+        if draft.only_ends and self._snapshots.known:
             return self._snapshots.latest
         known = self._snapshots.of_this_step() if draft.opcode in _CHANGE_NOTHING else None
         return known or self._snapshots.take()
@@ -398,9 +437,16 @@ class CommandSender:
         finally:
             checkpoint(Checkpoint.EXCHANGE, request)
 
-    def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
-        """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
-        deadline = Deadline.after(self._wire.clock, self._wire.timeout_s)
+    def _await_acknowledgement(
+        self, command: Command, before: Response, *, again: bool
+    ) -> tuple[Response, bool]:
+        """Return the snapshot that shows the acknowledgement of a block, or that it got lost.
+
+        Another client's that was acknowledged since ``before`` may be older, or hide that ours was;
+        where ours can be written ``again``, that is told like one that got lost.
+        """
+        most_s = min(self._wire.timeout_s, REST_S) if command.only_ends else self._wire.timeout_s
+        deadline = Deadline.after(self._wire.clock, most_s)
         now = before
         if not command.only_ends:
             self._wire.pause(_ACCEPTANCE_S)
@@ -411,20 +457,23 @@ class CommandSender:
             if came_too_early(command, before, now):
                 raise refused(command, now, ErrorClass.BUSY)
             if is_in_its_place(command, before, now):
-                raise self._wire.ended(self._overtaken(command, now))
+                if again:
+                    return now, False
+                raise self._wire.ended(overtaken(command, now))
             if now.rejected != before.rejected:
                 return now, False
             if deadline.expired:
-                silence = self._silence(
-                    tr("{request!r} was not acknowledged.", request=describe(command))
-                )
+                late = silence(tr("{request!r} was not acknowledged.", request=describe(command)))
                 # If a command to end a movement fails, it must be possible to send a stronger one.
-                raise silence if command.only_ends else self._wire.ended(silence)
+                raise late if command.only_ends else self._wire.ended(late)
 
     def _addressed(self, draft: Command, before: Response) -> Command:
         taken = {before.ack_head, before.active_movement}
         taken |= {end.sequence for end in before.finished}
         number = next_number(self._last or before.ack_head)
+        if draft.only_ends:
+            # The snapshot may be old: far from what others have counted to since.
+            number = next_number(number + _APART + runtime.random_number(6))
         while number in taken or self._wire.motions.holds(number):
             number = next_number(number)
         self._last = number
@@ -449,50 +498,3 @@ class CommandSender:
         opcode = Opcode(draft.opcode)
         if OPCODES[opcode].capability not in before.capabilities:
             raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
-
-    def _restless(self) -> OutcomeUnknownError:
-        return OutcomeUnknownError(
-            tr(
-                "robolink sent {controller} the stop, but could not confirm within {seconds:g} s "
-                "that the robot has stopped.",
-                controller=self._wire.identity,
-                seconds=REST_S,
-            ),
-            remedy=tr("It may still be moving."),
-            request="Stop",
-        )
-
-    def _silence(self, said: str) -> TransportTimeoutError:
-        return TransportTimeoutError(
-            said,
-            remedy=tr("Look at the PLC; the command may still be carried out."),
-        )
-
-    def _unseen(self, command: Command) -> UnclearAnswerError:
-        # The list of ended commands only keeps those that a stop ended; the end of an earlier one,
-        # good or bad, is no longer shown (docs/reference/mailbox.md, "When a command counts").
-        return UnclearAnswerError(
-            tr(
-                "A stop came before robolink read the end of {request!r}.",
-                request=describe(command),
-            ),
-            remedy=tr("Check what it should have changed."),
-        )
-
-    def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
-        return RemoteProtocolError(
-            tr(
-                "The PLC acknowledged command {number} of another client ({owner:08X}) in place of "
-                "{request!r}.",
-                number=now.ack_head,
-                owner=now.ack_owner,
-                request=describe(command),
-            ),
-            remedy=tr("Find the other client; only one at a time may command this mailbox."),
-        )
-
-
-def _still(before: Response, now: Response) -> bool:
-    return before.plc_heartbeat != now.plc_heartbeat and all(
-        abs(a - b) < _STILL for a, b in zip(before.axes, now.axes, strict=True)
-    )

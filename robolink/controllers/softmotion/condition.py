@@ -1,5 +1,7 @@
 """The state of an axis group in the words that all controllers share, and what it forbids."""
 
+from typing import Final
+
 from robolink.controllers.softmotion.heartbeat import MOST_LOOK_S
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason
 from robolink.messages import tr
@@ -12,6 +14,18 @@ _MOVING = frozenset({GroupState.MOVING, GroupState.HOMING})
 def is_moving(now: Response) -> bool:
     """Whether the group moves, whatever moves it; an interrupted movement does not move."""
     return now.group_state in _MOVING or bool(now.bits & Bits.JOGGING)
+
+
+_STAYED: Final = 0.05
+"""Largest change of a stopped axis within a tenth of a second, in its units: drives hold a position
+within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
+
+
+def has_stayed(before: Response, now: Response) -> bool:
+    """Whether every axis is where it was; a PLC whose program does not run shows nothing."""
+    return before.plc_heartbeat != now.plc_heartbeat and all(
+        abs(a - b) < _STAYED for a, b in zip(before.axes, now.axes, strict=True)
+    )
 
 
 def status_of(now: Response) -> ControllerStatus:

@@ -150,6 +150,11 @@ class Snapshots:
         self._head_s, self._whole_s = math.inf, 0.0
 
     @property
+    def known(self) -> bool:
+        """Whether this session has read a whole snapshot."""
+        return self._latest is not None
+
+    @property
     def latest(self) -> Response:
         """The last whole snapshot; known after :meth:`meet`."""
         assert self._latest is not None  # noqa: S101 - a controller is made after the meeting

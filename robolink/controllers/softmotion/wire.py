@@ -398,7 +398,8 @@ class MailboxWire:
     def _asked(self, exchange: Callable[[], T], *, awaited: bool = True) -> T:
         """Do an exchange until it is done, refused three times, or lost three times.
 
-        It is done only once more when its whole deadline has passed.
+        It is done only once more when its whole deadline has passed, and no more after a refusal
+        that took half of it.
 
         A look or a beat that is refused says of no command that it was not done. So once one was
         sent, it is told as an answer that makes no sense, which leaves open what became of that.
@@ -409,7 +410,7 @@ class MailboxWire:
         lost: list[RobolinkError] = []
         refused: list[RejectedError] = []
         deadline = Deadline.after(self.clock, self.timeout_s)
-        while max(len(lost), len(refused)) < _READS:
+        while len(lost) < _READS:
             last = bool(lost) and deadline.expired
             try:
                 with self._gate:
@@ -428,11 +429,11 @@ class MailboxWire:
                 if not self.commands:
                     raise
                 refused.append(error)
-        if len(refused) < _READS:
-            raise self._over(lost[0])
-        first = refused[0]
-        what, remedy, request = first.what, first.remedy, first.request
-        raise RemoteProtocolError(what, remedy=remedy, request=request) from first
+                if len(refused) == _READS or deadline.remaining_s() < self.timeout_s / 2:
+                    first = refused[0]
+                    what, remedy, request = first.what, first.remedy, first.request
+                    raise RemoteProtocolError(what, remedy=remedy, request=request) from first
+        raise self._over(lost[0])
 
     def _note_answer(self, sent_ns: int, *, awaited: bool = True) -> None:
         """Note an answer; the one that shows the end of a movement is waited for, and half another.

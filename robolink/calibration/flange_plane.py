@@ -16,6 +16,7 @@ or of another tool is no flange pose there, however well its numbers fit
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final, TypeVar
 
 from robolink.calibration.core.pose_checks import UPRIGHT_WITHIN_DEG, refuses_by_name
@@ -61,14 +62,7 @@ class FlangePlane:
     @classmethod
     def of(cls, pose: Pose) -> "FlangePlane":
         """Return that of a flange pose."""
-        u, v, w = (math.radians(a) for a in (pose.u_deg, pose.v_deg, pose.w_deg))
-        cu, su, cv, sv, cw, sw = (f(a) for a in (u, v, w) for f in (math.cos, math.sin))
-        return cls(
-            columns=((cu * cv, su * cv), (cu * sv * sw - su * cw, su * sv * sw + cu * cw)),
-            axis=(cu * sv * cw + su * sw, su * sv * cw - cu * sw),
-            level=(-sv, cv * sw),
-            r33=cv * cw,
-        )
+        return _turned(pose.u_deg, pose.v_deg, pose.w_deg)
 
     @property
     def lean_deg(self) -> float:
@@ -123,6 +117,19 @@ class FlangePlane:
     def rise_mm(self, tip: ToolOffset) -> float:
         """Return how far above the flange, in the base, a point of its axes lies."""
         return self.level[0] * tip.x_mm + self.level[1] * tip.y_mm + self.r33 * tip.z_mm
+
+
+@lru_cache(maxsize=256)
+def _turned(u_deg: float, v_deg: float, w_deg: float) -> FlangePlane:
+    """Return the plane at these angles; a solver asks for those of its poses again and again."""
+    u, v, w = (math.radians(a) for a in (u_deg, v_deg, w_deg))
+    cu, su, cv, sv, cw, sw = (f(a) for a in (u, v, w) for f in (math.cos, math.sin))
+    return FlangePlane(
+        columns=((cu * cv, su * cv), (cu * sv * sw - su * cw, su * sv * sw + cu * cw)),
+        axis=(cu * sv * cw + su * sw, su * sv * cw - cu * sw),
+        level=(-sv, cv * sw),
+        r33=cv * cw,
+    )
 
 
 @refuses_by_name

@@ -4,7 +4,7 @@ import inspect
 import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from functools import wraps
+from functools import lru_cache, wraps
 from numbers import Integral, Real
 from types import SimpleNamespace, UnionType
 from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -84,7 +84,7 @@ def misgiven(
         ['pose is not a Pose but (1, 2, 3) (tuple).']
     """
     try:
-        given = inspect.signature(function).bind(*args, **named).arguments
+        given = _signature(function).bind(*args, **named).arguments
     except TypeError:  # the arguments do not fit: Python's own error says so
         return
     for name, value in given.items():
@@ -116,6 +116,10 @@ Pose(x_mm, y_mm, z_mm, u_deg).
     return checking
 
 
+_signature = lru_cache(maxsize=64)(inspect.signature)
+
+
+@lru_cache(maxsize=256)
 def _hint(function: Callable[..., object], name: str) -> Any:  # noqa: ANN401 - any annotation
     only = SimpleNamespace(__annotations__={name: function.__annotations__.get(name)})
     try:

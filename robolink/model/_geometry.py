@@ -85,7 +85,7 @@ class Posture:
     j4_angle_deg: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Pose:
     """Where a frame carried by the robot is, seen from the base.
 
@@ -108,16 +108,48 @@ class Pose:
     tool: int | None = None
     posture: Posture | None = None
 
+    def __init__(
+        self,
+        x_mm: float,
+        y_mm: float,
+        z_mm: float,
+        u_deg: float,
+        v_deg: float = 0.0,
+        w_deg: float = 0.0,
+        hand: Hand | None = None,
+        local: int = 0,
+        tool: int | None = None,
+        posture: Posture | None = None,
+    ) -> None:
+        # Written out, since each movement makes a dozen poses, and each cycle of a simulated search
+        # one: by itself a frozen dataclass looks up for each field how it is stored.
+        _put_x(self, x_mm)
+        _put_y(self, y_mm)
+        _put_z(self, z_mm)
+        _put_u(self, u_deg)
+        _put_v(self, v_deg)
+        _put_w(self, w_deg)
+        _put_hand(self, hand)
+        _put_local(self, local)
+        _put_tool(self, tool)
+        _put_posture(self, posture)
+        self.__post_init__()  # that of a subclass, as a dataclass calls it
+
     def __post_init__(self) -> None:
         x, y, z, u, v, w = self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg
         if float is type(x) is type(y) is type(z) is type(u) is type(v) is type(w):
-            return  # nearly every pose, and each cycle of a simulated search makes one
+            return  # nearly every pose
         if not _NUMBERS.issuperset(map(type, (x, y, z, u, v, w))):
             require_numbers(self, "x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
     def coordinates(self) -> tuple[float, float, float, float, float, float]:
         """Return x, y, z in mm and u, v, w in degrees."""
         return (self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg)
+
+
+_PUTS: Final = [vars(Pose)[name].__set__ for name in Pose.__slots__]
+_put_x, _put_y, _put_z, _put_u, _put_v, _put_w = _PUTS[:6]
+_put_hand, _put_local, _put_tool, _put_posture = _PUTS[6:]
 
 
 def described(coordinates: Sequence[float]) -> str:

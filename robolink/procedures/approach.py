@@ -47,7 +47,8 @@ def approach_path(target: Pose, *, here: Pose, purpose: str) -> Procedure[None]:
 
 def offset_z(pose: Pose, by_mm: float) -> Pose:
     """Return ``pose`` with Z higher by ``by_mm``."""
-    return replace(pose, z_mm=pose.z_mm + by_mm)
+    x, y, z, u, v, w = pose.coordinates()
+    return Pose(x, y, z + by_mm, u, v, w, pose.hand, pose.local, pose.tool, pose.posture)
 
 
 def seek_or_retract(step: Seek, *, here: Pose, safe_z_mm: float) -> Procedure[Pose]:

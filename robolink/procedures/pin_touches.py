@@ -111,8 +111,9 @@ class PinTouches(WitnessedTouches):
         x_mm, y_mm, z_mm = self._standoff(expected)
         beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
         above_mm = self._plan.lift_mm if self._comes_down else z_mm
-        over = self._move(offset_z(beside, above_mm), Path.JOINT, turning)
-        arrival: Pose = yield replace(over, then=lowering() if self._comes_down else you_touch())
+        then = lowering() if self._comes_down else you_touch()
+        over = self._move(offset_z(beside, above_mm), Path.JOINT, turning, then=then)
+        arrival: Pose = yield over
         if self._comes_down:
             arrival = yield from self.come_down(offset_z(beside, z_mm))
         touch = yield from self.touched(
@@ -123,8 +124,7 @@ class PinTouches(WitnessedTouches):
 
     def come_down(self, target: Pose) -> Procedure[Pose]:
         """Go straight down to a standoff; returns the pose on arrival."""
-        down = self._move(target, Path.STRAIGHT, lowering())
-        arrival: Pose = yield replace(down, then=you_touch())
+        arrival: Pose = yield self._move(target, Path.STRAIGHT, lowering(), then=you_touch())
         return arrival
 
     def require_made(self) -> None:
@@ -152,9 +152,9 @@ class PinTouches(WitnessedTouches):
         one = self._drawing.next(taken, expected)
         return one.x_mm, one.y_mm, one.z_mm
 
-    def _move(self, target: Pose, path: Path, purpose: str) -> Move:
+    def _move(self, target: Pose, path: Path, purpose: str, *, then: str = "") -> Move:
         sideways = self._plan.nominal and self._plan.contact is None
-        return Move(target, path, purpose, FARTHEST_MM if sideways else 0.0)
+        return Move(target, path, purpose, FARTHEST_MM if sideways else 0.0, then)
 
     def off(self, touch: Pose) -> Move:
         """Return the step that lifts the tip off the pin."""

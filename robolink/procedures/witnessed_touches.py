@@ -370,10 +370,10 @@ class WitnessedTouches(ABC):
         except CalibrationError:
             yield self.off(arrival)
             raise
-        touch = replace(TouchedAt.of(answer), seed=self._seed)
-        if touch.typed:
-            return touch  # nothing shows that the standoff was jogged away
-        return replace(touch, arrival=arrival, standoff_mm=standoff_mm)
+        touch = TouchedAt.of(answer)
+        if touch.typed:  # nothing shows that the standoff was jogged away
+            return replace(touch, seed=self._seed)
+        return replace(touch, seed=self._seed, arrival=arrival, standoff_mm=standoff_mm)
 
     def _made(self, touch: TouchedAt) -> bool:
         if self._plan.contact is not None:

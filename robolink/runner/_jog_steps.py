@@ -96,12 +96,12 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
                 ),
                 remedy=_smaller_steps(axis, delta, limit),
             )
-    target = replace(
-        here,
-        x_mm=here.x_mm + deltas.get("x", 0.0),
-        y_mm=here.y_mm + deltas.get("y", 0.0),
-        z_mm=here.z_mm + deltas.get("z", 0.0),
-        u_deg=here.u_deg + deltas.get("u", 0.0),
+    target = Pose(
+        here.x_mm + deltas.get("x", 0.0),
+        here.y_mm + deltas.get("y", 0.0),
+        here.z_mm + deltas.get("z", 0.0),
+        here.u_deg + deltas.get("u", 0.0),
+        *(here.v_deg, here.w_deg, here.hand, here.local, here.tool, here.posture),
     )
     # A straight move that only turns is an error in SPEL+ without ROT (docs/reference/spel.md 7.1).
     return target, Path.JOINT if "u" in deltas else Path.STRAIGHT

@@ -246,23 +246,24 @@ def studentized_range_0999(count: int) -> float:
     if count < 2:
         raise ValueError(f"no range exists of {count} values")
 
-    def inside(width: float) -> float:
-        steps = 400
-        low, high = -9.0, 9.0
-        total = 0.0
-        for index in range(steps + 1):
-            z = low + (high - low) * index / steps
-            weight = 1 if index in (0, steps) else 4 if index % 2 else 2
-            total += (
-                weight * math.exp(-z * z / 2) * (_normal(z + width) - _normal(z)) ** (count - 1)
-            )
-        return count * total * (high - low) / steps / 3 / math.sqrt(2 * math.pi)
+    steps, low, high = 400, -9.0, 9.0
+    lowest = []
+    for index in range(steps + 1):
+        z = low + (high - low) * index / steps
+        weight = 1 if index in (0, steps) else 4 if index % 2 else 2
+        lowest.append((z, _normal(z), weight * _density(z)))
 
-    low, high = 1.0, 20.0
-    while high - low > 1e-9:
-        middle = (low + high) / 2
-        low, high = (middle, high) if inside(middle) < 0.999 else (low, middle)
-    return (low + high) / 2
+    def inside(width: float) -> float:
+        total = sum(
+            weighed * (_normal(z + width) - below) ** (count - 1) for z, below, weighed in lowest
+        )
+        return count * total * (high - low) / steps / 3
+
+    least, most = 1.0, 20.0
+    while most - least > 1e-7:
+        middle = (least + most) / 2
+        least, most = (middle, most) if inside(middle) < 0.999 else (least, middle)
+    return (least + most) / 2
 
 
 def _density(x: float) -> float:

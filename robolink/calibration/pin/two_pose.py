@@ -97,8 +97,8 @@ def solve_two_pose(
         rank=4,
         dof=0,
         sources=(ErrorSource.of_lengths("touch_mm", 2),),
+        sigma_stated=sigma_mm is not None,
     )
-    result = replace(result, sigma_stated=sigma_mm is not None)
     return _with_interval(result, Dispersion.of(0.0, 0, sigma_mm, grid_mm))
 
 

@@ -361,28 +361,33 @@ def shift_limit(changes: Sequence[float]) -> float:
     if min(changes) >= _KNOWN or len(changes) == 1:
         return chi_square_quantile(MOVED_PROBABILITY, len(changes))
     plane = min(*changes[:2], _KNOWN)
-    above = min(changes[2], _KNOWN) if len(changes) > 2 else None
+    third = _third_axis(min(changes[2], _KNOWN)) if len(changes) > 2 else [(1.0, 0.0)]
+
+    def too_often(limit: float) -> bool:
+        beyond = sum(share * _plane_beyond(limit - taken, plane) for share, taken in third)
+        return beyond > 1 - MOVED_PROBABILITY
+
     low, high = 0.0, 10.0
-    while _beyond(high, plane, above) > 1 - MOVED_PROBABILITY:
+    while too_often(high):
         low, high = high, 2 * high
-    for _ in range(50):
+    while high - low > 1e-9 * high:
         middle = (low + high) / 2
-        beyond = _beyond(middle, plane, above) > 1 - MOVED_PROBABILITY
-        low, high = (middle, high) if beyond else (low, middle)
+        low, high = (middle, high) if too_often(middle) else (low, middle)
     return (low + high) / 2
 
 
-def _beyond(limit: float, plane: float, above: float | None) -> float:
-    """Return P(T > limit); t of the third axis is sqrt(n) tan(angle), so no end is infinite."""
-    if above is None:
-        return _plane_beyond(limit, plane)
-    total = weight = 0.0
-    for step in range(_STEPS):
-        angle = math.pi / 2 * (step + 0.5) / _STEPS
-        density = math.cos(angle) ** (above - 1)
-        weight += density
-        total += density * _plane_beyond(limit - above * math.tan(angle) ** 2, plane)
-    return total / weight
+def _third_axis(changes: float) -> list[tuple[float, float]]:
+    """Return what the third axis adds to T, after the probability of each.
+
+    Its t is sqrt(n) tan(angle), so no end is infinite.
+    """
+    angles = [math.pi / 2 * (step + 0.5) / _STEPS for step in range(_STEPS)]
+    densities = [math.cos(angle) ** (changes - 1) for angle in angles]
+    total = sum(densities)
+    return [
+        (density / total, changes * math.tan(angle) ** 2)
+        for density, angle in zip(densities, angles, strict=True)
+    ]
 
 
 def _plane_beyond(limit: float, changes: float) -> float:

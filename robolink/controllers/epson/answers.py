@@ -6,7 +6,7 @@ What a look before a movement shows, and what was in force before a procedure.
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from robolink.errors import (
     NotReadyError,
@@ -231,8 +231,7 @@ class PowerAndSpeed:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class ArmState:
+class ArmState(NamedTuple):
     """What a movement depends on, as one look shows it.
 
     Attributes:

@@ -27,9 +27,22 @@ def canonical(value: object) -> str:
     return _ENCODER.encode(value)
 
 
+def is_json(value: object) -> bool:
+    """Whether the JSON text of ``value`` is read as ``value`` again: no tuples, no other keys."""
+    if type(value) is dict:
+        return all(type(key) is str and is_json(one) for key, one in value.items())
+    if type(value) is list:
+        return _AS_THEY_ARE.issuperset(map(type, value)) or all(map(is_json, value))
+    return type(value) in _AS_THEY_ARE
+
+
+_AS_THEY_ARE: Final = frozenset({str, float, int, bool, type(None)})
+
+
 def storable(text: str) -> str:
     """Return ``text`` as every database stores it: in English, valid Unicode without NUL."""
-    text = in_english(text)
+    if type(text) is not str:
+        text = in_english(text)
     if text.isascii() and "\0" not in text:
         return text
     return text.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")

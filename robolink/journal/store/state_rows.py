@@ -13,12 +13,12 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from robolink.errors import JournalError
 from robolink.journal._lease_view import FREE, LeaseView
 from robolink.journal.store import statements
-from robolink.journal.store.chain import canonical, storable
+from robolink.journal.store.chain import canonical, is_json, storable
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.messages import plain, tr
 from robolink.model import Marker, MarkerKind
@@ -106,10 +106,10 @@ class MarkerRows:
             "request": storable(marker.request),
             "begun_at": storable(marker.begun_at),
         }
-        given = plain(marker.details)
-        text = canonical(given)
-        details = json.loads(text)
-        if details != given:  # keys and values that JSON lacks; it is stored as it will be read
+        details: Any = plain(marker.details)
+        text = canonical(details)
+        if not is_json(details):  # it is stored as it will be read
+            details = json.loads(text)
             text = canonical(details)
         stored = _Stored(
             controller=values["of_controller"],
@@ -151,7 +151,7 @@ class MarkerRows:
         found: list[Marker] = []
         for name in names:
             rows = self._connection.rows(statements.MARKERS_OF, {"of_controller": storable(name)})
-            found += [_marker(_Stored(*row)) for row in rows]
+            found += map(_marker, rows)
         return tuple(found)
 
     def controllers(self, at_most: int) -> int:
@@ -170,8 +170,9 @@ class MarkerRows:
 
 
 @lru_cache(maxsize=256)
-def _marker(row: _Stored) -> Marker:
+def _marker(fields: Sequence[str]) -> Marker:
     """Return the marker that a row holds; the same few rows are read before each command."""
+    row = _Stored(*fields)
     try:
         kind, details = MarkerKind(row.kind), json.loads(row.details)
         if not isinstance(details, dict):
@@ -196,7 +197,10 @@ def _marker(row: _Stored) -> Marker:
 
 def _with_sum(row: _Stored, details: Mapping[str, object]) -> str:
     """Return the details of a marker, which its row holds without a checksum, with one."""
-    return canonical({**details, _SUM: _sum_of(row)})
+    told = _sum_of(row)
+    if details and min(details) > _SUM:  # mostly so: the key of the checksum is the first one
+        return f'{{"{_SUM}":"{told}",{row.details[1:]}'
+    return canonical({**details, _SUM: told})
 
 
 def _sum_of(fields: Sequence[str]) -> str:
@@ -275,19 +279,14 @@ class NameRows:
         if not self._connection.run(statements.MEET_FIRST, values):
             self._connection.run(statements.MEET_AGAIN, values)
 
-    def carry_over(self, name: str, controller: str) -> bool:
-        """Make a controller the owner of what is on record under ``name``.
-
-        Returns:
-            Whether it was nobody's before.
-        """
+    def carry_over(self, name: str, controller: str) -> None:
+        """Make a controller the owner of what is on record under ``name``, if it has none."""
         values = _pair(name, controller)
         if not self._connection.run(statements.SUCCEED, values):
-            return False
+            return
         for statement in (statements.PASS_ON, statements.MOVE_LEASE):
             self._connection.run(statement, values)
         MarkerRows(self._connection).rename(name, controller)
-        return True
 
     def note_robot(self, robot: str, controller: str) -> None:
         """Make a robot one of a controller's; what is open under its name goes there too.

@@ -246,16 +246,19 @@ def width(part: Data, dialect: Dialect) -> int:
 class FrameBuffer:
     """Holds what has arrived and hands out whole frames.
 
+    Attributes:
+        data: The bytes that no frame has used yet.
+
     Args:
         role: A host takes answers; a device takes requests, and EOT between them.
         dialect: How numbers are written.
         max_frame: Most bytes of one frame.
     """
 
-    __slots__ = ("_data", "_dialect", "_max_frame", "_role", "_scanned", "_sum")
+    __slots__ = ("_dialect", "_max_frame", "_role", "_scanned", "_sum", "data")
 
     def __init__(self, role: Role, dialect: Dialect, max_frame: int) -> None:
-        self._data = bytearray()
+        self.data = bytearray()
         self._dialect = dialect
         self._max_frame = max_frame
         self._role = role
@@ -263,15 +266,12 @@ class FrameBuffer:
 
     @property
     def held(self) -> bytes:
-        """The bytes that no frame has used yet."""
-        return bytes(self._data)
-
-    def __bool__(self) -> bool:
-        return bool(self._data)
+        """A copy of them."""
+        return bytes(self.data)
 
     def append(self, data: bytes) -> None:
         """Add what was received."""
-        self._data += data
+        self.data += data
 
     def take(self) -> SerialFrame | None:
         """Return the next frame, ``None`` while it is not whole.
@@ -281,57 +281,57 @@ class FrameBuffer:
         """
         if self._role is Role.DEVICE:
             self._skip_noise()
-        if not self._data:
+        if not self.data:
             return None
-        if self._data[0] == EOT and self._role is Role.DEVICE:
-            del self._data[0]
+        if self.data[0] == EOT and self._role is Role.DEVICE:
+            del self.data[0]
             return SerialFrame(EOT)
         self._check_first()
-        length = self._length() if len(self._data) >= _LEAD else None
-        if length is None and len(self._data) > self._max_frame:
+        length = self._length() if len(self.data) >= _LEAD else None
+        if length is None and len(self.data) > self._max_frame:
             raise RemoteProtocolError(
                 tr("A message is longer than {limit} bytes.", limit=self._max_frame),
                 remedy=tr("Check that a controller is at the other end, then connect again."),
-                raw=bytes(self._data[:80]),
+                raw=bytes(self.data[:80]),
             )
-        if length is None or len(self._data) < length:
+        if length is None or len(self.data) < length:
             return None
         return self._cut(length)
 
     def give_up(self) -> SerialFrame | None:
         """Return what is held as one frame that is not intact, ``None`` where nothing is."""
-        if not self._data:
+        if not self.data:
             return None
-        letter = self._data[1] if len(self._data) > 1 else 0
-        frame = SerialFrame(self._data[0], letter, bytes(self._data[_LEAD:]), intact=False)
-        self._data.clear()
+        letter = self.data[1] if len(self.data) > 1 else 0
+        frame = SerialFrame(self.data[0], letter, bytes(self.data[_LEAD:]), intact=False)
+        self.data.clear()
         self._scanned, self._sum = 1, 0
         return frame
 
     def _skip_noise(self) -> None:
-        begin = next((i for i, byte in enumerate(self._data) if byte in (STX, EOT)), None)
-        del self._data[: len(self._data) if begin is None else begin]
+        begin = next((i for i, byte in enumerate(self.data) if byte in (STX, EOT)), None)
+        del self.data[: len(self.data) if begin is None else begin]
 
     def _check_first(self) -> None:
         known = (STX,) if self._role is Role.DEVICE else (ACK, NAK)
-        if self._data[0] not in known:
+        if self.data[0] not in known:
             raise RemoteProtocolError(
                 tr(
                     "{data!r} does not begin an answer of Remote RS232.",
-                    data=bytes(self._data[:20]),
+                    data=bytes(self.data[:20]),
                 ),
                 remedy=tr(
                     "Check baud rate, parity and stop bits on both ends, and that the control "
                     "device is Remote RS232; then connect again."
                 ),
-                raw=bytes(self._data[:80]),
+                raw=bytes(self.data[:80]),
             )
 
     def _length(self) -> int | None:
         """Return how long the frame at the start is, ``None`` while that is unknown."""
-        if self._data[0] == NAK:
+        if self.data[0] == NAK:
             return _LEAD + _CODE_BYTES + _TAIL
-        letter = BY_BYTE.get(self._data[1])
+        letter = BY_BYTE.get(self.data[1])
         if letter is None:
             return self._text_length(_LEAD)
         return self._layout_length(letter)
@@ -351,10 +351,10 @@ class FrameBuffer:
 
     def _status_length(self) -> int | None:
         """Flags are 00 or 01, digits are not; so where they end is seen."""
-        body = self._data[_LEAD : _LEAD + max(_STATUS_FLAGS) + 1]
+        body = self.data[_LEAD : _LEAD + max(_STATUS_FLAGS) + 1]
         flags = next((i for i, byte in enumerate(body) if byte not in (0, 1)), None)
         if flags is None:
-            return None if len(body) <= max(_STATUS_FLAGS) else len(self._data)
+            return None if len(body) <= max(_STATUS_FLAGS) else len(self.data)
         comma = int(body[flags] == _COMMA)
         return _LEAD + flags + comma + _STATUS_DIGITS + _TAIL
 
@@ -363,7 +363,7 @@ class FrameBuffer:
 
         The sum runs along with the search: each byte is looked at once, however it arrives.
         """
-        data = self._data
+        data = self.data
         quoted = quoted and len(data) > start and data[start] == QUOTE
         while self._scanned + 1 < len(data):
             at = self._scanned
@@ -375,8 +375,8 @@ class FrameBuffer:
         return None
 
     def _cut(self, length: int) -> SerialFrame:
-        whole = bytes(self._data[:length])
-        del self._data[:length]
+        whole = bytes(self.data[:length])
+        del self.data[:length]
         self._scanned, self._sum = 1, 0
         intact = whole[-_TAIL] == ETX and check_sum(whole[1:-1]) == whole[-1]
         return SerialFrame(whole[0], whole[1], whole[_LEAD:-_TAIL], intact)

@@ -58,6 +58,9 @@ class MessageBuffer:
     Memory is bounded by ``max_line`` plus one chunk as long as :meth:`take` is called until
     it returns ``None`` after each :meth:`append`.
 
+    Attributes:
+        data: The bytes that no message has used yet.
+
     Args:
         max_line: Most bytes of one message.
         quoted_replies: Whether messages may be replies with a quoted payload.
@@ -66,7 +69,6 @@ class MessageBuffer:
     """
 
     __slots__ = (
-        "_data",
         "_ended",
         "_max_line",
         "_next_message",
@@ -74,6 +76,7 @@ class MessageBuffer:
         "_quoted_replies",
         "_scanned",
         "_skip_lf",
+        "data",
     )
 
     def __init__(
@@ -83,7 +86,7 @@ class MessageBuffer:
         quoted_replies: bool,
         next_message: Callable[[bytearray, int], int] | None = None,
     ) -> None:
-        self._data = bytearray()
+        self.data = bytearray()
         self._max_line = max_line
         self._quoted_replies = quoted_replies
         self._scanned = 0  # nothing before this index can end the message
@@ -94,11 +97,8 @@ class MessageBuffer:
 
     @property
     def held(self) -> bytes:
-        """The bytes that no message has used yet."""
-        return bytes(self._data)
-
-    def __bool__(self) -> bool:
-        return bool(self._data)
+        """A copy of them."""
+        return bytes(self.data)
 
     def append(self, data: bytes) -> None:
         """Add what was received."""
@@ -110,12 +110,12 @@ class MessageBuffer:
             self._skip_lf = False
             if data[0] == _LF:
                 data = data[1:]
-        self._data += data
+        self.data += data
 
     def end_message(self) -> None:
         """Make what is held a complete message, as if its terminator had come."""
-        if self._data and self._data[-1] not in (_CR, _LF):
-            self._data.append(_LF)
+        if self.data and self.data[-1] not in (_CR, _LF):
+            self.data.append(_LF)
             self._ended = True
 
     def take(self) -> bytes | None:
@@ -125,7 +125,7 @@ class MessageBuffer:
             RemoteProtocolError: The message is longer than the limit.
         """
         end = self._find_end()
-        if (len(self._data) if end < 0 else end) > self._max_line:
+        if (len(self.data) if end < 0 else end) > self._max_line:
             raise RemoteProtocolError(
                 tr("A message is longer than {limit} bytes.", limit=self._max_line),
                 remedy=tr("Check that this port is the controller's Remote Ethernet port."),
@@ -137,7 +137,7 @@ class MessageBuffer:
         if not self._opening:
             end = self._earliest(b"\r", b"\n")
             if end < 0:
-                self._scanned = len(self._data)
+                self._scanned = len(self.data)
                 return -1
             if self._quoted_replies:
                 self._opening = self._opening_quote(end)
@@ -147,32 +147,32 @@ class MessageBuffer:
         closing = self._earliest(b'"\r', b'"\n')
         if closing < 0:
             # The last byte may be the closing quote, with its line end still to come.
-            self._scanned = max(self._opening + 1, len(self._data) - 1)
+            self._scanned = max(self._opening + 1, len(self.data) - 1)
             return -1
         return closing + 1
 
     def _sooner(self, end: int, next_message: Callable[[bytearray, int], int]) -> int:
         """Return where a message that has no line end of its own ends before ``end``."""
-        following = next_message(self._data, 1)
+        following = next_message(self.data, 1)
         return following if 0 < following < end else end
 
     def _earliest(self, first: bytes, second: bytes) -> int:
-        one = self._data.find(first, self._scanned)
+        one = self.data.find(first, self._scanned)
         if one < 0:
-            return self._data.find(second, self._scanned)
-        other = self._data.find(second, self._scanned, one)
+            return self.data.find(second, self._scanned)
+        other = self.data.find(second, self._scanned, one)
         return one if other < 0 else other
 
     def _opening_quote(self, end: int) -> int:
         """Return the index of the quote that opens the payload of the line, 0 for none."""
-        data = self._data
+        data = self.data
         if data[0] != _HASH:
             return 0
         opening = data.find(b",", 0, end) + 1
         return opening if opening and data[opening] == _QUOTE else 0
 
     def _cut(self, end: int) -> bytes:
-        data = self._data
+        data = self.data
         message = bytes(data[:end])
         used = end + (data[end] in (_CR, _LF))
         if data[end] == _CR:
@@ -198,12 +198,12 @@ _ENCODINGS: Final = frozenset(
 class _Held(Protocol):
     """What has arrived, until it becomes an event."""
 
+    data: bytearray
+    """The bytes that no event has used yet."""
+
     @property
     def held(self) -> bytes:
-        """The bytes that no event has used yet."""
-
-    def __bool__(self) -> bool:
-        """Whether there are any."""
+        """A copy of them."""
 
     def append(self, data: bytes) -> None:
         """Add what was received."""
@@ -265,7 +265,7 @@ class EpsonCodec(ABC):
         """
         if self._failure is not None:
             raise self._failed_again(self._failure)
-        if not self._arrived and not self._ended:
+        if not self._arrived.data and not self._ended:
             return NEED_DATA  # called twice in every exchange, and mostly true
         try:
             return self._next_event()

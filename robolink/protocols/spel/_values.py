@@ -13,7 +13,6 @@ the number, a colon, and numbers between commas with any blanks.
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, Literal, NamedTuple
 
@@ -189,8 +188,7 @@ def unreadable(wanted: str, text: str) -> RemoteProtocolError:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class PrintedPoint:
+class PrintedPoint(NamedTuple):
     """A point as printed.
 
     Attributes:

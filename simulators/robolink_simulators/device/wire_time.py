@@ -52,7 +52,7 @@ class WireTime:
 class _LateRandom:
     """Stands for a generator that is made at first use."""
 
-    __slots__ = ("_first", "_generator", "_seed")
+    __slots__ = ("__dict__", "_first", "_generator", "_seed")
 
     def __init__(self, seed: str, first: Callable[[random.Random], object] | None) -> None:
         self._seed = seed
@@ -66,7 +66,10 @@ class _LateRandom:
             self._generator = random.Random(self._seed)
             if self._first is not None:
                 self._first(self._generator)
-        return getattr(self._generator, name)
+        found = getattr(self._generator, name)
+        if callable(found):  # a method: it is found at once from here on
+            self.__dict__[name] = found
+        return found
 
 
 def late_random(

@@ -39,7 +39,7 @@ _STILL = 1e-9
 _Ways = tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: each motion makes one, in a third of the time
 class Travelled:
     """A motion, or its part until it was stopped or observed.
 
@@ -56,20 +56,18 @@ class Travelled:
     complete: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Travel:
     start_ns: int
     legs: tuple[Leg, ...]
     ends_ns: tuple[int, ...] = field(init=False)
+    end_ns: int = field(init=False)
 
     def __post_init__(self) -> None:
         # Calculated once: each poll of a movement reads them several times.
         totals = accumulate(leg.duration_ns for leg in self.legs)
-        object.__setattr__(self, "ends_ns", tuple(self.start_ns + total for total in totals))
-
-    @property
-    def end_ns(self) -> int:
-        return self.ends_ns[-1] if self.ends_ns else self.start_ns
+        self.ends_ns = tuple(self.start_ns + total for total in totals)
+        self.end_ns = self.ends_ns[-1] if self.ends_ns else self.start_ns
 
     def looks(self, since_ns: int, now_ns: int) -> list[int]:
         """Return when to observe the joints so that each one's last direction is seen."""
@@ -361,7 +359,12 @@ class Arm:
     def _ways(self, before: Joints, after: Joints) -> _Ways:
         """Return in which direction each joint last turned, from one pose to the other."""
         changes = zip(before, after, self._turned, strict=True)
-        return tuple(_sign(new - old) or way for old, new, way in changes)
+        return tuple(
+            [
+                way if abs(new - old) < _STILL else math.copysign(1.0, new - old)
+                for old, new, way in changes
+            ]
+        )
 
     def _trailing(self, joints: Joints, ways: _Ways) -> Joints:
         plays = [self.backlash_deg / 2] * len(joints)
@@ -386,7 +389,3 @@ def _whole(legs: Sequence[Leg]) -> Sequence[Leg]:
 
 def _place(flange: Pose) -> Place:
     return flange.x_mm, flange.y_mm, flange.z_mm
-
-
-def _sign(value: float) -> float:
-    return 0.0 if abs(value) < _STILL else math.copysign(1.0, value)

@@ -7,7 +7,7 @@ in ``FULL_SPEED_AFTER_S``. Real controllers smooth the corners; nothing here dep
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Protocol, Self
+from typing import Final, NamedTuple, Protocol, Self
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
@@ -113,8 +113,7 @@ class JointPace:
     tip_limit_mm_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LinePace:
+class LinePace(NamedTuple):
     """How fast a straight leg may be; the turn values rule legs that only turn."""
 
     speed_mm_s: float

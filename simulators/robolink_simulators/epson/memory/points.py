@@ -24,7 +24,7 @@ HIGHEST_POINT: Final = 999
 HIGHEST_LOCAL: Final = 15
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: each look at the arm makes one, in a third of the time
 class Point:
     """A SPEL+ point value.
 

@@ -385,6 +385,8 @@ class StatementExecution:
     def _run(self, statement: Statement) -> None:
         """Begin a statement; what takes no time is done when this returns."""
         match statement:
+            case Print():  # most are
+                outcome = StatementOutcome(effect(self._evaluator, statement))
             case KeywordStatement("wait"):
                 outcome = self._wait(statement)
             case KeywordStatement("recover"):

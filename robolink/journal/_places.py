@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path, PureWindowsPath
 from typing import Final
 
@@ -219,16 +220,23 @@ def share_in(table: str, path: str) -> str | None:
     What is mounted at ``/`` is this computer's own: a diskless PC, a container.
     """
     longest, found = "/", ""
-    for line in table.split("\n"):
-        mount, _, source = line.partition(" - ")
-        fields, kind = mount.split(" "), source.partition(" ")[0]
-        if len(fields) < 5 or not kind:
-            continue
-        point = _ESCAPED.sub(lambda code: chr(int(code[1], 8)), fields[4])
+    for point, kind in _mounts(table):
         # A later mount covers an earlier one at the same place.
         if len(point) >= len(longest) and (path + "/").startswith(point.rstrip("/") + "/"):
             longest, found = point, kind
     return found if longest != "/" and re.fullmatch(_SHARES, found, re.VERBOSE) else None
+
+
+@lru_cache(maxsize=1)  # each journal that is opened reads the table, which seldom changes
+def _mounts(table: str) -> tuple[tuple[str, str], ...]:
+    """Return where something is mounted, and its kind, in the order of a table of mounts."""
+    found = []
+    for line in table.split("\n"):
+        mount, _, source = line.partition(" - ")
+        fields, kind = mount.split(" "), source.partition(" ")[0]
+        if len(fields) >= 5 and kind:
+            found.append((_ESCAPED.sub(lambda code: chr(int(code[1], 8)), fields[4]), kind))
+    return tuple(found)
 
 
 def share_of_windows(path: str, drive_type: Callable[[str], int]) -> str | None:

@@ -8,6 +8,7 @@ asked for that, so where it is missing what was compiled last is used.
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from robolink.messages import install
@@ -88,6 +89,7 @@ def catalogue(language: str, name: str) -> "GNUTranslations | None":
         language: One of :data:`LANGUAGES` that has a folder.
         name: :data:`OURS` or :data:`CLICK`.
     """
+    import copy
     import gettext
     import io
     import struct
@@ -100,10 +102,20 @@ def catalogue(language: str, name: str) -> "GNUTranslations | None":
     except ImportError:
         pass  # no Babel: the last compiled catalogue is used, without newer sentences
     try:
-        with open(compiled, "rb") as file:
-            return gettext.GNUTranslations(file)
+        # A copy, as gettext itself gives: the caller adds a fallback to it.
+        seen = os.stat(compiled)
+        return copy.copy(_read(compiled, (seen.st_mtime_ns, seen.st_size)))
     except (OSError, struct.error, UnicodeError, LookupError):
         return None
+
+
+@lru_cache(maxsize=2 * len(TERRITORY))
+def _read(compiled: str, _version: tuple[int, int]) -> "GNUTranslations":
+    """Return a compiled catalogue; a process that runs several commands reads each once."""
+    import gettext
+
+    with open(compiled, "rb") as file:
+        return gettext.GNUTranslations(file)
 
 
 def _is_newer(source: str, compiled: str) -> bool:

@@ -315,7 +315,7 @@ def _to_write(path: Path) -> DatabaseConnection:
     connection = _connect(_uri(path, "mode=rw"))
     try:
         _prepare(connection)
-        reserve = LogReserve(path, connection)
+        reserve = LogReserve(connection)
     except BaseException:
         connection.close()
         raise

@@ -54,15 +54,13 @@ class LogReserve:
     """Keeps room in the write-ahead log of one connection.
 
     Args:
-        database: The file of the database.
-        driver: The connection to it.
+        driver: The connection to the file of the database.
 
     Raises:
         sqlite3.Error: The file cannot be read; so each call.
     """
 
-    def __init__(self, database: Path, driver: "sqlite3.Connection") -> None:
-        self._database = database
+    def __init__(self, driver: "sqlite3.Connection") -> None:
         self._driver = driver
         self._extent = (0, 0, 0)
         self._opened: FileIO | None = None
@@ -140,9 +138,11 @@ class LogReserve:
 
     def _open(self) -> FileIO:
         """Open the log, which is there as long as a connection that has read or written."""
-        real = self._database.resolve()  # as SQLite names the log
+        # SQLite follows links to the database on POSIX, not on Windows, and names the log after it.
+        listed = self._driver.execute("PRAGMA database_list").fetchall()
+        (database,) = [file for _number, name, file in listed if name == "main"]
         # Unbuffered: others write it between two looks.
-        log = real.with_name(real.name + "-wal").open("r+b", buffering=0)
+        log = Path(f"{database}-wal").open("r+b", buffering=0)  # noqa: SIM115 - closed below
         self._opened, self._close = log, finalize(self, log.close)  # also of one nobody closes
         return log
 

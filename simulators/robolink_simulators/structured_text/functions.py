@@ -104,6 +104,9 @@ def _shift(given: Sequence[Typed], name: str, place: TextPlace) -> Typed:
         raise _not_for(name, piece, place)
     by = _integer_getter(count, name, place)
     get, bits, mask = piece.get, of.bits, (1 << of.bits) - 1
+    fixed = count.constant
+    if name == "SHR" and fixed is not None and fixed >= 0:  # as a checksum does at every word
+        return Typed(of, lambda frame: get(frame) >> fixed)
 
     def shifted(frame: Frame) -> int:
         value: int = get(frame)

@@ -222,9 +222,11 @@ def _member(whole: VariableReference, name: str, place: TextPlace) -> VariableRe
     writable = whole.writable and (
         isinstance(whole.type, StructType) or variable.kind == "var_input"
     )
+    held = whole.slot
     return VariableReference(
         variable.type,
-        lambda frame: get(frame)[slot],
+        # Most are of a variable of the block itself, and a program reads thousands in a cycle.
+        (lambda frame: frame[held][slot]) if held >= 0 else lambda frame: get(frame)[slot],
         lambda frame: (get(frame), slot),
         whole.name,
         writable=writable,
@@ -243,9 +245,11 @@ def _element(
             raise refused(place, tr("an index is a whole number"))
     key = _offset(of, numbers, place, whole.name)
     get = whole.get
+    held = whole.slot
     return VariableReference(
         of.element,
-        lambda frame: get(frame)[key(frame)],
+        # As for a member.
+        (lambda frame: frame[held][key(frame)]) if held >= 0 else lambda f: get(f)[key(f)],
         lambda frame: (get(frame), key(frame)),
         whole.name,
         writable=whole.writable,

@@ -350,7 +350,7 @@ class StatementTranslator(ExpressionTranslator):
 
         def turn(frame: Frame) -> int:
             while test(frame):
-                count_turn(runtime, place)
+                _count_turn(runtime, place)
                 end = body(frame)
                 if end:
                     return _ON if end == _EXIT else end
@@ -366,7 +366,7 @@ class StatementTranslator(ExpressionTranslator):
 
         def turn(frame: Frame) -> int:
             while True:
-                count_turn(runtime, place)
+                _count_turn(runtime, place)
                 end = body(frame)
                 if end:
                     return _ON if end == _EXIT else end
@@ -432,7 +432,9 @@ def _counting(
         value = frame[slot] = first(frame)
         turned = False
         while (value <= last(frame)) if step > 0 else (value >= last(frame)):
-            count_turn(runtime, place)
+            runtime.turns_left -= 1
+            if runtime.turns_left < 0:
+                raise _turned_too_often(place)
             end = body(frame)
             if end:
                 return _ON if end == _EXIT else end
@@ -446,17 +448,16 @@ def _counting(
     return count
 
 
-def count_turn(runtime: Runtime, place: TextPlace) -> None:
-    """Count a turn of a loop.
-
-    Raises:
-        StructuredTextError: The loops of this cycle have turned too often.
-    """
+def _count_turn(runtime: Runtime, place: TextPlace) -> None:
     runtime.turns_left -= 1
     if runtime.turns_left < 0:
-        raise refused(
-            place, tr("the loops of one cycle turned more than {count} times", count=TURNS_A_CYCLE)
-        )
+        raise _turned_too_often(place)
+
+
+def _turned_too_often(place: TextPlace) -> Exception:
+    return refused(
+        place, tr("the loops of one cycle turned more than {count} times", count=TURNS_A_CYCLE)
+    )
 
 
 def bound_value(tree: Node) -> int:

@@ -3,7 +3,8 @@
 import copy
 import gc
 import threading
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, MutableMapping
+from dataclasses import replace
 from functools import cache
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ from asyncua.server.address_space import (
     AttributeValue,
     NodeData,
     NodeManagementService,
+    ViewService,
 )
 from asyncua.ua.ua_binary import extensionobject_to_binary, nodeid_from_binary, pack_uatype
 from asyncua.ua.ua_binary import unpack_uatype as unpacked
@@ -42,27 +44,82 @@ _VARIABLES: Final = 4
 _VALUE: Final = ua.AttributeIds.Value
 
 
-@cache
-def _standard_nodes() -> Mapping[ua.NodeId, NodeData]:
-    """Return the 6,000 nodes of the standard: once a process, by nine megabytes of source.
+class StandardNodes:
+    """The 6,000 nodes of the standard; each is made when it is first asked for.
 
-    Whoever serves nothing does not import those. Without a pause the collector would take as long
-    again as all that is made here, which stays.
+    A server and its clients ask for a tenth of them, and asyncua would take ten times as long to
+    make all. They are nine megabytes of source: whoever serves nothing does not import those.
     """
-    from asyncua.server.standard_address_space import standard_address_space
 
-    space = AddressSpace()
-    collected = gc.isenabled()
-    gc.disable()
-    try:
-        standard_address_space.fill_address_space(NodeManagementService(space))
-    finally:
-        if collected:
-            gc.enable()
-    nodes: Mapping[ua.NodeId, NodeData] = space._nodes  # noqa: SLF001 - asyncua has no other way
-    return nodes
+    def __init__(self) -> None:
+        from asyncua.server.standard_address_space import standard_address_space
+
+        self._items: dict[ua.NodeId, ua.AddNodesItem] = {}
+        self._references: dict[ua.NodeId, dict[tuple[ua.NodeId, ua.NodeId], bool]] = {}
+        self._made: dict[ua.NodeId, NodeData] = {}
+        collected = gc.isenabled()
+        gc.disable()  # it would take as long again as all that is kept here, which stays
+        try:
+            standard_address_space.fill_address_space(self)
+        finally:
+            if collected:
+                gc.enable()
+
+    def try_add_nodes(self, items: Iterable[ua.AddNodesItem], *, check: bool) -> tuple[()]:  # noqa: ARG002 - as asyncua calls it
+        """Keep what nodes are made of; none is refused."""
+        for item in items:
+            number, parent = item.RequestedNewNodeId, item.ParentNodeId
+            self._items[number] = item
+            if not parent.is_null():
+                self._refer(parent, item.ReferenceTypeId, number, True)
+        return ()
+
+    def try_add_references(self, references: Iterable[ua.AddReferencesItem]) -> tuple[()]:
+        """Keep references; none is refused."""
+        for one in references:
+            self._refer(one.SourceNodeId, one.ReferenceTypeId, one.TargetNodeId, one.IsForward)
+        return ()
+
+    def __contains__(self, number: object) -> bool:
+        return number in self._items
+
+    def __iter__(self) -> Iterator[ua.NodeId]:
+        return iter(self._items)
+
+    def __getitem__(self, number: ua.NodeId) -> NodeData:
+        if (node := self._made.get(number)) is None:
+            node = self._made[number] = self._make(self._items[number])
+        return node
+
+    def _make(self, item: ua.AddNodesItem) -> NodeData:
+        space, number = AddressSpace(), item.RequestedNewNodeId
+        alone = replace(item, ParentNodeId=ua.NodeId(), TypeDefinition=ua.NodeId())
+        list(NodeManagementService(space).try_add_nodes([alone], check=False))
+        node = space[number]
+        node.references = [
+            self._described(*one, forward) for one, forward in self._references[number].items()
+        ]
+        return node
+
+    def _refer(self, source: ua.NodeId, kind: ua.NodeId, target: ua.NodeId, forward: bool) -> None:
+        self._references.setdefault(source, {}).setdefault((kind, target), forward)
+
+    def _described(
+        self, kind: ua.NodeId, target: ua.NodeId, forward: bool
+    ) -> ua.ReferenceDescription:
+        item = self._items[target]
+        return ua.ReferenceDescription(
+            ReferenceTypeId=kind,
+            IsForward=forward,
+            NodeId=target,
+            BrowseName=item.BrowseName,
+            DisplayName=item.NodeAttributes.DisplayName,
+            NodeClass=item.NodeClass,
+            TypeDefinition=item.TypeDefinition,
+        )
 
 
+_standard_nodes: Final = cache(StandardNodes)
 _FILLING: Final = threading.Lock()
 
 
@@ -106,6 +163,19 @@ def _copied(standard: NodeData) -> NodeData:
         value = copy.deepcopy(held.value) if attribute == _VALUE else held.value
         node.attributes[attribute] = AttributeValue(value)
     return node
+
+
+class Views(ViewService):
+    """Answers clients that browse; looks for subtypes of references once, since none are added."""
+
+    def __init__(self, space: AddressSpace) -> None:
+        super().__init__(space)
+        self._subtypes: dict[ua.NodeId, frozenset[ua.NodeId]] = {}
+
+    def _get_sub_ref(self, ref: ua.NodeId) -> frozenset[ua.NodeId]:
+        if (found := self._subtypes.get(ref)) is None:
+            found = self._subtypes[ref] = frozenset(super()._get_sub_ref(ref))
+        return found
 
 
 Shown = Callable[[ua.NodeId, Any], ua.DataValue]

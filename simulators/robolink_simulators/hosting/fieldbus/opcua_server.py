@@ -34,7 +34,7 @@ from robolink_simulators.hosting.fieldbus.opcua_connections import (
     PlannedWire,
     SymbolListener,
 )
-from robolink_simulators.hosting.fieldbus.opcua_nodes import SAMPLE_S, OwnNodes, SymbolTree
+from robolink_simulators.hosting.fieldbus.opcua_nodes import SAMPLE_S, OwnNodes, SymbolTree, Views
 from robolink_simulators.hosting.fieldbus.opcua_symbols import (
     PublishedSymbols,
     ServedSymbols,
@@ -155,6 +155,7 @@ class _Internal(InternalServer):
     async def load_standard_address_space(self, shelf_file: Any = None) -> None:  # noqa: ANN401, ARG002 - asyncua's
         """Take those that all servers of this process share."""
         self.aspace._nodes = OwnNodes()  # noqa: SLF001 - asyncua has no other way
+        self.view_service = Views(self.aspace)
 
     def create_session(
         self,

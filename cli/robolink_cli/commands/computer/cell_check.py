@@ -231,6 +231,9 @@ def _measured(
     failure, reached = None, None
     begun_s = time.monotonic()
     try:
+        # Asked once: the answer signs what the measurement records, and the check.
+        person = signature_of(context.operator, context.expected, changes=True)
+        context = context._replace(operator=person.operator or None)
         with open_controller(context, quiet=True, changes=True) as controller:
             reached = controller
             read: ToolState | NotReadyError

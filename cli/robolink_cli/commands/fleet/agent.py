@@ -151,8 +151,7 @@ def _metrics_of(made: "Agent", plant: str, address: str | None) -> Iterator[str 
     from robolink.fleet.plant_view.metrics import PlantMetrics, metrics_served
     from robolink_cli.commands.simulate.service import host_and_port
 
-    whole = address if ":" in address else f"127.0.0.1:{address}"
-    host, port = host_and_port(whole, "--metrics")
+    host, port = host_and_port(address, "--metrics")
     notes = PlantNotes(default_plant(), plant)  # never closed: that would wait for a look
     with metrics_served(host, port, PlantMetrics(notes.look, lambda: made.turned_s)) as url:
         yield url

@@ -256,7 +256,7 @@ def _moved(address: str, by: int) -> str | None:
     host, port = host_and_port(address, "")
     if port == 0:
         return address
-    shown = address.rpartition(":")[0]
+    shown = address.rpartition(":")[0] or host
     return f"{shown}:{port + by}" if port + by <= _LAST_PORT and host else None
 
 

@@ -210,21 +210,14 @@ def controlled(
 
 
 def host_and_port(address: str, option: str) -> tuple[str, int]:
-    """Return host and port of an address.
+    """Return host and port of an address; a port alone is one of this computer.
 
     Raises:
         ConfigError: It is none; names the option that it was given to.
     """
     host, colon, port = address.rpartition(":")
-    host = host.removeprefix("[").removesuffix("]")
-    if not (
-        colon
-        and host
-        and port.isascii()
-        and port.isdigit()
-        and len(port) <= 5
-        and int(port) <= 0xFFFF
-    ):
+    host = host.removeprefix("[").removesuffix("]") if colon else "127.0.0.1"
+    if not (host and port.isascii() and port.isdigit() and len(port) <= 5 and int(port) <= 0xFFFF):
         raise ConfigError(
             tr("{address!r} is not an address to listen on.", address=address),
             remedy=tr("Write for example {option} 127.0.0.1:5000.", option=option),

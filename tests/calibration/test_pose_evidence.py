@@ -357,6 +357,11 @@ def test_a_bias_toward_the_approach_is_found_when_the_sides_are_drawn():
     assert told(biased).approach_bias_mm == pytest.approx(0.06, abs=0.02)
     assert "approach_bias" not in fair.warnings
     assert told(fair).approach_bias_u_mm == pytest.approx(0.005, abs=0.003)
+    # Three touches have six numbers, and five are told by place, tip and bias.
+    three = with_approach_bias(solve_n_angle(PLAIN[:3]), [(1, 0), (0, 1), (-1, 0)])
+    assert told(three).approach_bias_mm == pytest.approx(0.0, abs=1e-9)
+    two = with_approach_bias(solve_n_angle(PLAIN[:2]), [(1, 0), (0, 1)])
+    assert told(two).approach_bias_mm is None
 
 
 def test_a_bias_that_never_turns_against_tool_or_base_cannot_be_found():

@@ -193,6 +193,18 @@ def test_a_seed_gives_its_standoffs_and_another_one_others():
         assert standoff.z_mm >= 2.0
 
 
+def test_a_standoff_is_drawn_anew_until_pin_and_needle_cannot_explain_it():
+    poses = [contact(TIP, (u, 0, 0)) for u in ORDER[:4]]
+    columns = np.array([[1, np.exp(1j * math.radians(pose.u_deg))] for pose in poses])
+    for seed in range(40):
+        series, taken = StandoffSeries(seed, 2.0), [(poses[0], NO_STANDOFF)]
+        for pose in poses[1:]:
+            taken.append((pose, series.next(taken, pose)))
+        left = np.array([complex(one.x_mm, one.y_mm) for _, one in taken])
+        rest = left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+        assert np.vdot(rest, rest).real >= 0.28 * 2
+
+
 @pytest.mark.parametrize(
     ("drift_mm", "verdict"),
     [

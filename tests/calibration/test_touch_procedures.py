@@ -8,7 +8,7 @@ import pytest
 
 from robolink.calibration import Drift, DriftVerdict
 from robolink.calibration_run import foresee
-from robolink.errors import CalibrationError
+from robolink.errors import CalibrationError, ConfigError
 from robolink.methods import measure_two_pose
 from robolink.model import Path, Pose, ToolOffset, WorkBox, rotate_xy
 from robolink.procedures import (
@@ -16,6 +16,7 @@ from robolink.procedures import (
     SurfaceTouches,
     TouchPlan,
     contact_pose,
+    turn_in_air,
     verify_by_turning,
 )
 from robolink.runner import (
@@ -324,3 +325,15 @@ def test_a_measurement_beside_the_edge_of_the_box_is_refused_before_it_moves():
 
     assert not refusals(1.21)
     assert refusals(1.19)
+
+
+@pytest.mark.parametrize(("turn_deg", "possible"), [(360.0, True), (-360.0, True), (360.1, False)])
+def test_a_turn_in_the_air_is_a_whole_one_at_most(turn_deg, possible):
+    course = turn_in_air(Pose(300.0, 100.0, -60.0, 0.0, tool=1), turn_deg, lift_mm=10.0)
+    if possible:
+        *_, last = course
+        assert isinstance(last, Move)
+        assert last.target.u_deg == turn_deg
+    else:
+        with pytest.raises(ConfigError, match="is not a possible turn"):
+            next(course)

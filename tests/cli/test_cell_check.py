@@ -275,6 +275,25 @@ def test_nothing_moves_without_a_person_s_yes(cells, simulator, watched, tmp_pat
     assert entry.details["tools"]["1"][0] == 12.0
 
 
+def test_who_measures_is_asked_for_a_badge_once(cells, watched, tmp_path, monkeypatch, capsys):
+    badges: list[str] = []
+
+    def badge(question):
+        badges.append(question)
+        return "4711"
+
+    monkeypatch.setattr("robolink_cli.session.operator_identity.person_here", lambda: True)
+    monkeypatch.setattr("robolink_cli.prompts.questions.asked_for_text", badge)
+    watched(yes=False)
+    with open(tmp_path / "cells.toml", "a") as file:
+        file.write('[cells.line3.people]\n4711 = "engineer"\n')
+    assert main.run(["check", "--measure", str(tmp_path / "beams.toml")]) == 9
+    assert "You said no." in capsys.readouterr().out
+    assert len(badges) == 1
+    (entry,) = recorded()
+    assert (entry.signature.operator, str(entry.signature.role)) == ("4711", "engineer")
+
+
 def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, watched, tmp_path):
     asked = watched(yes=True)
     example = ROOT / "examples" / "recipes" / "scara-pin.toml"

@@ -13,6 +13,8 @@ from robolink_cli.command_map import SECTIONS
 from robolink_cli.commands.groups import cell, expert, robot
 from robolink_cli.console.render import json_is_on, note
 from robolink_cli.session.connection import open_controller
+from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason
@@ -78,17 +80,18 @@ def test_looking_at_the_commands_loads_none_of_the_heavy_packages(arguments, env
     assert expected in done.stdout
 
 
-def test_a_tool_is_read_without_an_eye(simulator):
-    program = (
-        "import sys\n"
-        "from robolink_cli.main import run\n"
-        f"code = run(['-c', {simulator.url!r}, 'tool', 'get', '1'])\n"
-        "eyes = {'PIL', 'cv2', 'robolink.eye', 'robolink.eye.picture'} & set(sys.modules)\n"
-        "print('loaded:', sorted(eyes), code)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
-    )
+def test_a_tool_is_read_without_an_eye(state_folder):
+    with serve_tcp(EpsonSimulator(seed=4)) as host:
+        program = (
+            "import sys\n"
+            "from robolink_cli.main import run\n"
+            f"code = run(['-c', {host.url!r}, 'tool', 'get', '1'])\n"
+            "eyes = {'PIL', 'cv2', 'robolink.eye', 'robolink.eye.picture'} & set(sys.modules)\n"
+            "print('loaded:', sorted(eyes), code)\n"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
+        )
     assert done.stdout.splitlines()[-1] == "loaded: [] 0", done.stdout + done.stderr
 
 

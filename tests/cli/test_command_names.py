@@ -71,26 +71,26 @@ def test_a_click_without_that_shell_says_what_to_install(monkeypatch, capsys):
     assert "click 8.5" in capsys.readouterr().err
 
 
+OFFERED = {
+    ("robolink", "expert", "comp"): {"completion"},
+    ("robolink", "-c", ""): {"line3", "a"},
+    ("robolink", "status", "-c", "li"): {"line3"},
+    ("robolink", "cell", "sh"): {"show"},
+}
+
+
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash on this machine")
-@pytest.mark.parametrize(
-    ("words", "offered"),
-    [
-        (["robolink", "expert", "comp"], {"completion"}),
-        (["robolink", "-c", ""], {"line3", "a"}),
-        (["robolink", "status", "-c", "li"], {"line3"}),
-        (["robolink", "cell", "sh"], {"show"}),
-    ],
-)
-def test_tab_in_bash_offers_what_fits(shell_environment, words, offered):
-    quoted = " ".join(f"'{word}'" for word in words)
-    script = (
-        'eval "$(robolink expert completion bash)"\n'
-        f"COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}\n"
-        "_robolink_completion robolink\n"
-        'printf "%s\\n" "${COMPREPLY[@]}"\n'
-    )
+def test_tab_in_bash_offers_what_fits(shell_environment):
+    lines = ['eval "$(robolink expert completion bash)"']
+    for words in OFFERED:
+        quoted = " ".join(f"'{word}'" for word in words)
+        lines += [
+            f"COMPREPLY=(); COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}",
+            "_robolink_completion robolink",
+            'echo "${COMPREPLY[@]}"',
+        ]
     done = subprocess.run(
-        ["bash", "-c", script],
+        ["bash", "-c", "\n".join(lines)],
         env=shell_environment,
         capture_output=True,
         text=True,
@@ -98,9 +98,9 @@ def test_tab_in_bash_offers_what_fits(shell_environment, words, offered):
         check=True,
     )
     assert done.stderr == ""
-    assert offered <= set(done.stdout.split())
-    if words[-1]:
-        assert all(word.startswith(words[-1]) for word in done.stdout.split())
+    for (words, expected), line in zip(OFFERED.items(), done.stdout.splitlines(), strict=True):
+        assert expected <= set(line.split())
+        assert all(word.startswith(words[-1]) for word in line.split()), (words, line)
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash on this machine")

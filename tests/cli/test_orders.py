@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import robolink
 from robolink.journal import open_journal
 from robolink.model import EntryKind, ToolOffset
+from robolink.transaction import Wanted, change_tools
 
 OLD, OTHER = ToolOffset(12.0, -3.5, -20.0), ToolOffset(13.0, -3.5, -20.0)
 ORDER = ("--order", "A-17", "--yes")
@@ -22,13 +24,14 @@ def soak(job):
 
 @pytest.fixture
 def cell(run, simulator):
-    """The command line of a cell with a backup, and three tools changed since by two changes."""
+    """A cell with a backup, and three tools changed since by a change each."""
     simulator.machine.tools.set(1, OLD)
     simulator.machine.tools.select(1)
     assert run("tool", "backup", "golden.json")[0] == 0
-    for words in (("2", "--x", "1"), ("1", "--x", "13"), ("3", "--x", "3")):
-        assert run("tool", "set", *words, "--yes")[0] == 0
-    assert run("tool", "select", "2", "--yes")[0] == 0
+    with robolink.connect(simulator.url) as controller:
+        for tool, offset in ((2, ToolOffset(1)), (1, OTHER), (3, ToolOffset(3))):
+            change_tools(controller, [Wanted(tool, offset, controller.tools.read(tool))])
+        controller.tools.select(2)
     simulator.machine.motors_on = True
     return simulator
 
@@ -139,7 +142,7 @@ def test_f79_a_backup_is_saved_once(run, cell):
 
 
 @pytest.mark.fault("F79")
-@pytest.mark.parametrize("change", ["gone", "changed"])
+@pytest.mark.parametrize("change", [soak("gone"), "changed"])
 def test_f79_a_backup_whose_file_is_not_there_as_it_was_is_refused_by_name(run, cell, change):
     assert run(*SAVE)[0] == 0
     file = Path("kept.json").absolute()
@@ -177,7 +180,7 @@ def test_f79_what_was_refused_is_not_carried_out_by_a_second_delivery(run, cell,
 
 
 @pytest.mark.fault("F79")
-@pytest.mark.parametrize("job", ["clear", "restore", soak("undo")])
+@pytest.mark.parametrize("job", [soak("clear"), "restore", soak("undo")])
 def test_f79_a_dry_run_carries_out_no_order(run, cell, job):
     code, _, err = run(*JOBS[job][:-1], "--dry-run")
     assert (code, "A dry run carries out no order" in err) == (2, True)

@@ -4,7 +4,6 @@ Each sentence is put between 【 and 】 and is two fifths longer, so a literal 
 shows, and so does text that the journal keeps.
 """
 
-import gc
 import io
 import json
 import re
@@ -89,12 +88,15 @@ def other_help_options():
     forget_help_options()
 
 
-def forget_help_options():
-    gc.unfreeze()  # otherwise objects imported during collection are missing
-    for command in gc.get_objects():
-        if issubclass(type(command), click.Command):  # some objects do not reveal their class
-            command._help_option = None
-    gc.freeze()
+def forget_help_options(command: click.Command = main.cli):
+    command._help_option = None
+    if not isinstance(command, click.Group):
+        return
+    context = click.Context(command)
+    for name in (*command.list_commands(context), *getattr(command, "_unlisted", ())):
+        child = command.get_command(context, name)
+        assert child is not None
+        forget_help_options(child)
 
 
 def test_help_pages_come_from_the_catalogue_and_keep_to_their_width(marked, capfd):

@@ -1,5 +1,6 @@
 """The conditions under which a served simulator ends by itself."""
 
+import errno
 import json
 import os
 import signal
@@ -41,6 +42,16 @@ def test_it_ends_when_nobody_has_asked_for_so_long():
     # A client asks between the first twelve looks, and nobody afterwards.
     assert waited(life, requests) >= 0.2 + 11 * 0.2 / 4
     assert looked.count(12) >= 4
+
+
+def test_a_folder_that_a_client_still_uses_fails_no_end(monkeypatch):
+    def used(path, **_):
+        raise OSError(errno.EBUSY, os.strerror(errno.EBUSY), path)
+
+    with monkeypatch.context() as patched:
+        with Termination() as stopped:
+            patched.setattr(os, "rmdir", used)
+    os.rmdir(stopped.state_dir)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows does not tell that a parent has ended")

@@ -43,7 +43,7 @@ def served(tmp_path):
 
 
 def test_a_mailbox_is_served_beside_other_buses_and_the_urls_say_how(served):
-    table = 'kind = "softmotion"\ntcp = "127.0.0.1:0"\nopcua = "127.0.0.1:0"\n'
+    table = 'kind = "softmotion"\ntcp = "127.0.0.1:0"\nopcua = "0"\n'
     simulator, document = served(table)
     urls = document["urls"]
     assert list(urls) == ["modbus-tcp", "opcua", "opcua-unsecured"]
@@ -86,9 +86,10 @@ def test_a_user_comes_in_with_the_password_of_the_environment(served, monkeypatc
     assert PASSWORD not in "".join(capsys.readouterr())
 
 
-def test_each_cell_of_a_file_gets_a_port_of_its_own(tmp_path):
+@pytest.mark.parametrize("place", ["127.0.0.1:4840", "4840"])
+def test_each_cell_of_a_file_gets_a_port_of_its_own(tmp_path, place):
     path = tmp_path / "cells.toml"
-    cells = '[cells.a]\nkind = "softmotion"\ncount = 2\nopcua = "127.0.0.1:4840"\n'
+    cells = f'[cells.a]\nkind = "softmotion"\ncount = 2\nopcua = "{place}"\n'
     path.write_text(HEAD + cells, encoding="utf-8")
     places = [cell.given["opcua"] for cell in read_cells(path, sim.commands)]
     assert places == ["127.0.0.1:4840", "127.0.0.1:4841"]
@@ -111,7 +112,7 @@ def test_a_plan_is_refused_before_anything_is_served_if_the_link_cannot_have_it(
     assert "tear_array cannot happen on softmotion+modbus-tcp" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("place", ["0.0.0.0:0", "nowhere"])
+@pytest.mark.parametrize("place", ["0.0.0.0:0", "nowhere", ":0", "-1", "65536"])
 def test_an_address_that_is_none_or_that_others_reach_is_refused(place, capsys):
     assert main.run(["sim", "softmotion", "--opcua", place]) == 2
     assert capsys.readouterr().out == ""

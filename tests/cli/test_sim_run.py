@@ -189,6 +189,7 @@ tcp = "127.0.0.1:6012"
             "line 2, cells.a: The EPSON simulator has no",
         ),
         ('[cells.a]\nkind = "epson"\npoints = []\n[cells.a.world]\nx = 1', "line 2, cells.a: "),
+        ('[cells.a]\nkind = "epson"\n[cells.a.options]\nx = 1', "line 4, cells.a.options: is not"),
         ('[cells.a]\nkind = "plc"', "line 2, cells.a.map: is missing"),
         (
             f'[cells.a]\nkind = "plc"\nmap = "{MAP}"\nassist = true',

@@ -402,7 +402,7 @@ print(*sorted(set(sys.argv[1:]) & set(sys.modules)), sep=",")
 OF_ASYNCUA = {"asyncio", "asyncua", "logging"}
 
 
-@pytest.mark.parametrize("kind", ["epson", "modbus", "opcua"])
+@pytest.mark.parametrize("kind", ["epson", "modbus", pytest.param("opcua", marks=pytest.mark.soak)])
 def test_nothing_heavy_is_loaded_before_the_robot_stands(state_folder, kind):
     expected = set()
     with ExitStack() as stack:

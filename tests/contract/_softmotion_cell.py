@@ -2,7 +2,7 @@
 
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import count
@@ -164,6 +164,11 @@ def _free_port() -> int:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port
+
+
+def on_links(value: object, links: Iterable[Any]) -> list[Any]:
+    """Return a parameter with each of some links, which keep their marks."""
+    return [pytest.param(value, *link.values, marks=link.marks) for link in links]
 
 
 def above(pose: Pose, by_mm: float) -> Pose:

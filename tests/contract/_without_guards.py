@@ -215,6 +215,9 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.softmotion.commands.CommandSender._allowed": (
         lambda sender, draft, _require: sender._before(draft)
     ),
+    "robolink.controllers.softmotion.commands.CommandSender._before": (
+        lambda sender, _draft: sender._snapshots.take()
+    ),
     "robolink.controllers.ToolWrite.change": _changed,
     "robolink.controllers.ToolTableCore.require_writable": _nothing,
     "robolink.model.ChangeGuard.require": _nothing,

@@ -9,7 +9,7 @@ from robolink_simulators.control.assist import InProcessEyes, perform
 from robolink_simulators.hosting.in_process import epson, softmotion
 
 import robolink
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, NotReadyError
 from robolink.model import InputEdge, Pose, WorkBox
 from robolink.runner import Runner, RunSettings, ask_for_pose
 
@@ -85,6 +85,10 @@ def test_a_movement_stops_at_the_contact(cell):
     assert isinstance(found, Pose)
     assert found.z_mm == pytest.approx(contact_mm, abs=LATE_MM)
     assert controller.io.read_input(INPUT)
+    stands_mm = controller.groups[0].pose().z_mm
+    with pytest.raises(NotReadyError, match="Input 7 is on before the movement begins"):
+        seek_down(controller)
+    assert controller.groups[0].pose().z_mm == pytest.approx(stands_mm, abs=0.005)
 
 
 def test_a_movement_beside_the_pin_finds_nothing(cell):

@@ -1,6 +1,7 @@
 """Movements are sent at most once, watched, stoppable and limited; settings are restored after."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
@@ -71,6 +72,15 @@ def test_a_statement_that_may_have_left_is_known_to_a_stop(controller, monkeypat
     assert session.pending is not None
     with pytest.raises(BusyError):
         session.ask(execution(Statement("Wait 1")))
+
+
+def test_no_movement_begins_within_the_procedure_of_another_thread(controller):
+    group, target = start(controller)
+    with controller.procedure("a change"), ThreadPoolExecutor(1) as other:
+        late = other.submit(group.move_to, target, STRAIGHT, box=EVERYWHERE)
+        with pytest.raises(BusyError, match="must wait"):
+            late.result(10)
+    assert group.pose().z_mm == pytest.approx(target.z_mm - 5.0, abs=0.005)
 
 
 def test_a_joint_move_turns_the_tool(controller):

@@ -151,7 +151,7 @@ def test_only_a_connection_that_is_long_in_coming_makes_room_for_another_cell():
     assert slots.take()
 
 
-@pytest.mark.parametrize(("files", "most"), [(1024, 512), (256, 128), (64, 64), (-1, 512)], ids=str)
+@pytest.mark.parametrize(("files", "most"), [(256, 128), (64, 64), (-1, 512)], ids=str)
 def test_no_more_cells_are_waited_for_than_the_process_has_files(monkeypatch, files, most):
     resource = pytest.importorskip("resource")
     monkeypatch.setattr(resource, "getrlimit", lambda _which: (files, resource.RLIM_INFINITY))

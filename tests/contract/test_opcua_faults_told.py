@@ -32,6 +32,7 @@ pytestmark = pytest.mark.simulator_only
 PATIENCE_S = 0.5
 PARENT = "/DeviceSet/*/Resources/Application/GlobalVars/GVL_Tools"
 TOOL = robolink.ToolOffset(1, 2, 3)
+OLD = {"x": -4.5, "y": 2.5, "z": 1.0}
 SLOW = MotionProfile(Path.STRAIGHT, speed_mm_s=20)
 
 READS = (
@@ -40,9 +41,6 @@ READS = (
     ("out_of_service", RejectedError, "BadOutOfService"),
     ("lose_session", TransportBrokenError, "BadSessionIdInvalid"),
     ("drop_channel", TransportBrokenError, "BadSecureChannelClosed"),
-    ("disconnect", TransportBrokenError, "closed the connection"),
-    ("reset", TransportBrokenError, "broke"),
-    ("half_open", TransportTimeoutError, "did not answer"),
     ("drop_reply", TransportTimeoutError, "did not answer"),
 )
 WRITES = (
@@ -62,7 +60,10 @@ TOLD_ON_OTHER_LINKS_TOO = (
     ("truncate_reply", TransportTimeoutError, "did not answer"),
     ("duplicate_reply", RemoteProtocolError, "makes no sense"),
     ("zero_reply", RemoteProtocolError, "it is empty"),
+    ("disconnect", TransportBrokenError, "closed the connection"),
     ("disconnect_before", TransportBrokenError, "closed the connection"),
+    ("reset", TransportBrokenError, "broke"),
+    ("half_open", TransportTimeoutError, "did not answer"),
     ("restart", TransportBrokenError, "has restarted"),
     ("word_order", RemoteProtocolError, "high word first"),
 )
@@ -171,31 +172,41 @@ def test_a_torn_block_is_read_again_and_one_that_stays_torn_is_told(robolink_sta
         assert asked() == before + 3
 
 
-@pytest.mark.parametrize(("action", "kind", "words", "arrived"), WRITES, ids=lambda value: value)
-def test_each_fault_of_a_write_is_told_and_nothing_is_sent_twice(
-    robolink_state, tmp_path, action, kind, words, arrived
-):
-    path = written_symbol_map(tmp_path)
+@pytest.fixture(scope="module")
+def plc_with_a_map(tmp_path_factory):
+    path = written_symbol_map(tmp_path_factory.mktemp("map"))
     plc = PlcSimulator(load_symbol_map(path), seed=7)
     with serve_plc_opcua(plc, path) as host:
-        with robolink.connect(host.url, timeout_s=PATIENCE_S) as controller:
-            confirm_whole_map(controller)
-            old = controller.tools.read(1)
-            plc.faults.add(Fault(FaultAction[action.upper()], match="write GVL_Tools.aNeedleA"))
-            with pytest.raises(kind) as told:
-                controller.tools.write(1, TOOL, expected=old)
-        assert words in str(told.value)
-        sent = [text for _, way, text in plc.log if way == ">" and text.endswith("aNeedleA")]
-        assert sum(text.startswith("write") for text in sent) == 1
-        assert (plc.program.shown()[1]["x"] == TOOL.x_mm) is arrived
-        assert plc.program.takeovers == (action == "ignore_write")
+        yield plc, host.url
 
 
-def test_an_array_that_changes_while_it_is_read_is_never_taken_for_a_tool(robolink_state, tmp_path):
+@pytest.mark.parametrize(("action", "kind", "words", "arrived"), WRITES, ids=lambda value: value)
+def test_each_fault_of_a_write_is_told_and_nothing_is_sent_twice(
+    robolink_state, plc_with_a_map, action, kind, words, arrived
+):
+    plc, url = plc_with_a_map
+    plc.program.set_tool(1, OLD)
+    plc.log.clear()
+    takeovers = plc.program.takeovers
+    with robolink.connect(url, timeout_s=PATIENCE_S) as controller:
+        confirm_whole_map(controller)
+        old = controller.tools.read(1)
+        plc.faults.add(Fault(FaultAction[action.upper()], match="write GVL_Tools.aNeedleA"))
+        with pytest.raises(kind) as told:
+            controller.tools.write(1, TOOL, expected=old)
+    assert words in str(told.value)
+    sent = [text for _, way, text in plc.log if way == ">" and text.endswith("aNeedleA")]
+    assert sum(text.startswith("write") for text in sent) == 1
+    assert (plc.program.shown()[1]["x"] == TOOL.x_mm) is arrived
+    assert plc.program.takeovers - takeovers == (action == "ignore_write")
+
+
+def test_an_array_that_changes_while_it_is_read_is_never_taken_for_a_tool(
+    robolink_state, plc_with_a_map
+):
     """The program changes the array in each answer: no two readings are equal, none is believed."""
-    path = written_symbol_map(tmp_path)
-    plc = PlcSimulator(load_symbol_map(path), seed=7)
-    with serve_plc_opcua(plc, path) as host, robolink.connect(host.url) as controller:
+    plc, url = plc_with_a_map
+    with robolink.connect(url) as controller:
         due = controller.tools.read(1)
         held = dict(plc.program.in_force[1])
         count = 0
@@ -211,6 +222,7 @@ def test_an_array_that_changes_while_it_is_read_is_never_taken_for_a_tool(roboli
         with pytest.raises(RemoteProtocolError, match="changes at every reading"):
             controller.tools.read(1)
         plc.on_reply = None
+        plc.faults.forget()
         plc.program.set_tool(1, held)
         assert controller.tools.read(1) == due
 

@@ -1,11 +1,13 @@
 """The pytest plugin in third-party tests, which do not touch the tester's own journal."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 import robolink
 from robolink import ToolOffset
-
-pytest_plugins = ["pytester"]
 
 SERVED = """
 import re
@@ -78,6 +80,9 @@ def test_the_next_starts_clean(epson_tcp, robolink_state):
 """
 
 
+PYTEST = "import sys, pytest; sys.exit(pytest.main(sys.argv[1:]))"
+
+
 @pytest.fixture
 def own_folder(tmp_path, monkeypatch):
     """The state folder of the tester."""
@@ -92,19 +97,26 @@ def contents(folder):
 
 
 def test_served_simulators_have_the_seed_and_leave_nothing_in_the_tester_s_own_folder(
-    pytester, own_folder, monkeypatch
+    tmp_path, own_folder, monkeypatch
 ):
     own_folder.mkdir()
     (own_folder / "journal.db").write_bytes(b"precious")
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(own_folder / "journal.db"))
     monkeypatch.setenv("ROBOLINK_PLANT", "postgresql://tester@plant/copies")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
     before = contents(own_folder)
-    pytester.makepyfile(test_served=SERVED, test_cut=CUT)
+    (theirs := tmp_path / "theirs").mkdir()
+    (theirs / "test_served.py").write_text(SERVED)
+    (theirs / "test_cut.py").write_text(CUT)
     # It runs in its own process: the environment when the plugin was loaded is the tester's.
     # Hypothesis, which none of its tests uses, would take as long as all else.
     left_out = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest")
-    words = (*left_out, "-W", "error", "--robolink-seed", "7")
-    pytester.runpytest_subprocess(*words).assert_outcomes(passed=6)
+    strict = ("-W", "error", "-W", "ignore::pytest.PytestAssertRewriteWarning")  # it is forked
+    command = (sys.executable, "-m", "tests._program", PYTEST, "-q", *left_out, *strict)
+    done = subprocess.run(
+        [*command, "--robolink-seed", "7"], cwd=theirs, capture_output=True, text=True, check=False
+    )
+    assert "6 passed in" in done.stdout, done.stdout
     assert contents(own_folder) == before
 
 

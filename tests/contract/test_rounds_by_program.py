@@ -19,8 +19,9 @@ import robolink
 from robolink.calibration import Beam
 from robolink.errors import CalibrationError, RemoteProtocolError, RobolinkError
 from robolink.methods import BeamsParameters, BeamsSource
-from robolink.model import EntryKind, Hand, ToolOffset
+from robolink.model import EntryKind, Hand, Pose, ToolOffset
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, decode_line, encode_line
+from robolink.serving._beam_measure import _require_turned
 from robolink.serving._beam_round import read_round, require_promised, round_crossings
 from robolink.stations import BeamStation
 from tests.contract._sensor_cell import SensorCell
@@ -525,3 +526,11 @@ def test_the_longest_round_fits_into_a_text_of_the_controller():
     sides = tuple(field if re.fullmatch("0..", field) else "-9899" for field in SIDES)
     line = encode_line(CallbackLine(99, CallbackWord.ROUND, (*state, *sides)))
     assert len(line) <= 255 + 2
+
+
+def test_beams_are_tested_sixty_degrees_or_more_from_every_angle_of_the_measurement():
+    measured = [Pose(300.0, 100.0, -80.0, 0.0), Pose(300.0, 100.0, -80.0, -170.0)]
+    _require_turned([Pose(300.0, 100.0, -80.0, 60.0)], measured)
+    with pytest.raises(CalibrationError) as raised:
+        _require_turned([Pose(300.0, 100.0, -80.0, 59.9)], measured)
+    assert raised.value.code == "insufficient_rotation"

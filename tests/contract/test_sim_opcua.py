@@ -9,10 +9,12 @@ from typing import Any
 
 import pytest
 from asyncua import ua
+from asyncua.server.address_space import AddressSpace, NodeManagementService
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
+from robolink_simulators.hosting.fieldbus.opcua_nodes import StandardNodes
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.testkit.media import served
 
@@ -54,6 +56,53 @@ def test_the_variables_stand_where_a_codesys_runtime_has_them(peer):
     assert peer.node(RESPONSE).nodeid.to_string() == (
         f"ns=4;s=|var|{DEVICE}.Application.RL_Symbols.response"
     )
+
+
+def test_standard_nodes_lead_to_each_other_and_say_what_they_are(peer):
+    async def found(client):
+        status = await client.nodes.server.get_child(["0:ServerStatus"])
+        clock = await status.get_child(["0:CurrentTime"])
+        return await clock.read_value(), await status.get_references()
+
+    now, references = peer.do(found)
+    assert abs(datetime.now(UTC) - now.replace(tzinfo=UTC)).total_seconds() < 10
+    assert {
+        (47, False, "Server", "Object", 2004),
+        (40, True, "ServerStatusType", "VariableType", 0),
+        (47, True, "CurrentTime", "Variable", 63),
+    } <= {
+        (
+            one.ReferenceTypeId.Identifier,
+            one.IsForward,
+            one.BrowseName.Name,
+            one.NodeClass.name,
+            one.TypeDefinition.Identifier,
+        )
+        for one in references
+    }
+
+
+@pytest.mark.soak
+def test_each_standard_node_is_as_asyncua_makes_it():
+    from asyncua.server.standard_address_space import standard_address_space
+
+    space = AddressSpace()
+    standard_address_space.fill_address_space(NodeManagementService(space))
+    nodes = StandardNodes()
+    assert {*nodes} == {*space.keys()}
+    for number in nodes:
+        made, due = nodes[number], space[number]
+        values = [
+            {attribute: held.value for attribute, held in node.attributes.items()}
+            for node in (made, due)
+        ]
+        assert values[0] == values[1], number
+        references = [
+            {(one.ReferenceTypeId, one.NodeId): one for one in node.references}
+            for node in (made, due)
+        ]
+        assert references[0] == references[1], number
+        assert len(made.references) == len(due.references)
 
 
 def test_each_variable_tells_its_type_its_length_and_who_may_write(peer):

@@ -21,12 +21,21 @@ from robolink.errors import (
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols.mailbox import CoordinateSystem, ErrorClass
-from tests.contract._softmotion_cell import LINKS, LINKS_BUT_OPCUA, QUICK, SLOW, above, served
+from tests.contract._softmotion_cell import (
+    FEW_LINKS,
+    LINKS,
+    LINKS_BUT_OPCUA,
+    QUICK,
+    SLOW,
+    above,
+    on_links,
+    served,
+)
 
 ANYWHERE = WorkBox()
 
 
-@pytest.fixture(params=LINKS_BUT_OPCUA)
+@pytest.fixture(params=FEW_LINKS)
 def cell(request):
     with served(request.param) as cell:
         yield cell
@@ -61,6 +70,7 @@ def test_a_joint_move_turns_the_tool(group):
     assert group.pose().u_deg == pytest.approx(target.u_deg, abs=1e-6)
 
 
+@pytest.mark.parametrize("cell", LINKS_BUT_OPCUA, indirect=True)
 def test_four_movements_may_be_under_way_and_a_fifth_has_to_wait(cell, group):
     start = group.pose()
     ways = [above(start, by_mm) for by_mm in (2.0, 3.0, 1.0, 0.0)]
@@ -160,8 +170,11 @@ def test_a_move_that_takes_too_long_is_halted_and_its_end_is_seen(cell, group):
 
 
 @pytest.mark.fault("F21")
-@pytest.mark.parametrize("cell", LINKS, indirect=True)
-@pytest.mark.parametrize("danger", ["press_estop", "fail_axis"])
+@pytest.mark.parametrize(
+    ("danger", "cell"),
+    [*on_links("press_estop", LINKS), *on_links("fail_axis", LINKS_BUT_OPCUA)],
+    indirect=["cell"],
+)
 def test_an_emergency_stop_or_a_failing_drive_ends_the_move_and_nothing_is_sent_again(
     cell, controller, group, danger
 ):

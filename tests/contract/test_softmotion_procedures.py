@@ -23,7 +23,16 @@ from robolink.errors import (
 )
 from robolink.model import ANY, ControllerState, EntryKind, ToolOffset, Verdict, WorkBox
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
-from tests.contract._softmotion_cell import FEW_LINKS, LINKS, OWNER_SILENCE_S, QUICK, above, served
+from tests.contract._softmotion_cell import (
+    FEW_LINKS,
+    LINKS,
+    LINKS_BUT_OPCUA,
+    OWNER_SILENCE_S,
+    QUICK,
+    above,
+    on_links,
+    served,
+)
 
 SCRATCH = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0)
@@ -126,16 +135,19 @@ def test_a_nozzle_change_finds_the_true_tip_writes_it_once_and_proves_it(cell, c
     assert {EntryKind.CALIBRATION, EntryKind.WRITE, EntryKind.DONE, EntryKind.VERIFY} <= kinds
 
 
+SETTLED = {
+    "done": (PlcFaultAction.DROP_REPLY, Verdict.DONE, NEW),
+    "not applied": (PlcFaultAction.IGNORE_WRITE, Verdict.NOT_APPLIED, None),
+}
+
+
 @pytest.mark.parametrize(
-    ("action", "verdict", "held"),
-    [
-        (PlcFaultAction.DROP_REPLY, Verdict.DONE, NEW),
-        (PlcFaultAction.IGNORE_WRITE, Verdict.NOT_APPLIED, None),
-    ],
-    ids=["done", "not applied"],
+    ("ended", "cell"),
+    [*on_links("done", LINKS), *on_links("not applied", LINKS_BUT_OPCUA)],
+    indirect=["cell"],
 )
-@pytest.mark.parametrize("cell", LINKS, indirect=True)
-def test_a_write_without_an_answer_is_settled_by_reading(cell, action, verdict, held):
+def test_a_write_without_an_answer_is_settled_by_reading(cell, ended):
+    action, verdict, held = SETTLED[ended]
     cell.simulator.faults.add(PlcFault(action, match="write_command WRITE_TOOL"))
     with cell.connect(timeout_s=TIMEOUT_S) as controller:
         with pytest.raises(OutcomeUnknownError, match="WRITE_TOOL") as unknown:

@@ -60,10 +60,10 @@ def told(log, *looks: str) -> list[str]:
 
 EPSON = ("epson-sim", "epson-tcp")
 BACKENDS = (*EPSON, *plcs.LINKS)
-BUT_OPCUA = (*EPSON, *plcs.LINKS_BUT_OPCUA)
+FEW = (*EPSON, *plcs.FEW_LINKS)
 
 
-@pytest.fixture(params=BUT_OPCUA)
+@pytest.fixture(params=FEW)
 def stopped(request):
     with bench(request.param) as on:
         on.controller.tools.write(2, ToolOffset(1.0), expected=on.controller.tools.read(2))
@@ -173,7 +173,7 @@ def test_a_stop_while_a_person_is_asked_about_a_reset_is_not_released_by_the_yes
         controller.reset_fault()
 
 
-@pytest.mark.parametrize("backend", BUT_OPCUA)
+@pytest.mark.parametrize("backend", FEW)
 @pytest.mark.parametrize("asked", ["place", "yes or no", "text"])
 def test_an_answer_that_a_stop_overtakes_counts_no_more(backend, asked):
     with bench(backend) as on:

@@ -16,11 +16,13 @@ from robolink.errors import (
     LoginRefusedError,
     LoginUnansweredError,
     NotReadyError,
+    OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
+    TransportTimeoutError,
 )
 from robolink.model import ControllerState, MotionProfile, Path, WorkBox
-from tests.contract._softmotion_cell import BACKENDS, LINKS, SLOW, above
+from tests.contract._softmotion_cell import BACKENDS, LINKS, LINKS_BUT_OPCUA, SLOW, above
 from tests.contract._softmotion_cell import served as served_plc
 
 CREEPING = MotionProfile(Path.STRAIGHT, 5, 1.0)
@@ -221,6 +223,36 @@ def test_a_beat_that_is_refused_holds_no_stop_back():
         assert cell.simulator.faults.times_fired > 1
 
 
+BUSY, NO_ANSWER_OF_THE_PLC = 6, 11
+"""What a server, and a gateway to one, say of a look in a Modbus exception."""
+
+
+@pytest.mark.parametrize(
+    ("backend", "fault"),
+    [
+        ("modbus-tcp", PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=BUSY)),
+        ("modbus-tcp", PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=NO_ANSWER_OF_THE_PLC)),
+        ("modbus-rtu", PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=BUSY)),
+        pytest.param(
+            "opcua", PlcFault(PlcFaultAction.OUT_OF_SERVICE), marks=pytest.mark.soak
+        ),  # the server takes a second to come up
+    ],
+    ids=lambda value: value if isinstance(value, str) else f"{value.action.name}-{value.code}",
+)
+def test_no_look_of_an_open_session_holds_its_stop_back(backend, fault):
+    with served_plc(backend) as cell, cell.connect(timeout_s=0.2) as controller:
+        controller.take()
+        cell.simulator.faults.add(replace(fault, match="read_", every=1))
+        with pytest.raises((OutcomeUnknownError, TransportTimeoutError)) as unconfirmed:
+            controller.stop()
+        assert "press the emergency stop" in unconfirmed.value.remedy
+        assert cell.commands == ["STOP"]
+        cell.simulator.faults.forget()
+        controller._mailbox.wire.close()
+        with cell.connect() as later:
+            assert later.status().paused
+
+
 def test_looks_that_are_refused_for_a_moment_hold_no_stop_back():
     busy = PlcFaultAction.MODBUS_EXCEPTION
     with served_plc("modbus-tcp") as cell:
@@ -231,6 +263,7 @@ def test_looks_that_are_refused_for_a_moment_hold_no_stop_back():
         assert cell.simulator.faults.times_fired == 4
 
 
+@pytest.mark.parametrize("plc", LINKS_BUT_OPCUA, indirect=True)
 def test_a_group_that_is_disabled_is_stopped_without_an_error(plc):
     with plc.connect() as controller:
         controller.motors(False)

@@ -333,23 +333,24 @@ def test_a_nozzle_is_changed_in_a_cell_whose_program_is_executed(program, softmo
     change_nozzle(softmotion_factory(medium="modbus-tcp", person=True, program=program))
 
 
-FAILING = """
-import gc
+LIGHT = """
 import sys
-import weakref
-import pytest
+import robolink_simulators.pytest_plugin
+heavy = {"numpy", "lark", "pymodbus", "can", "canopen", "psycopg", "pydantic", "click"}
+assert not heavy & set(sys.modules)
+ours = [name for name in sys.modules if name.startswith("robolink")]
+assert ours == ["robolink_simulators", "robolink_simulators.pytest_plugin"], ours
+"""
+
 
 def test_the_plugin_is_light():
-    heavy = {"numpy", "lark", "pymodbus", "can", "canopen", "psycopg", "pydantic", "click"}
-    assert not heavy & set(sys.modules)
-    ours = [name for name in sys.modules if name.startswith("robolink")]
-    assert ours == ["robolink_simulators", "robolink_simulators.pytest_plugin"]
+    subprocess.run([sys.executable, "-c", LIGHT], check=True, timeout=60)
 
-def test_fails(epson_sim, softmotion_sim):
-    import robolink
-    with robolink.connect(epson_sim.url) as controller:
-        controller.status()
-    epson_sim.wire.assert_sent("nothing of the kind")
+
+FAILING = """
+import gc
+import weakref
+import pytest
 
 held = []
 
@@ -359,6 +360,12 @@ def test_passes(epson_sim):
 def test_the_cells_of_a_test_are_gone_with_it():
     gc.collect()
     assert held[0]() is None
+
+def test_fails(epson_sim, softmotion_sim):
+    import robolink
+    with robolink.connect(epson_sim.url) as controller:
+        controller.status()
+    epson_sim.wire.assert_sent("nothing of the kind")
 
 def test_a_command_is_told_what_the_test_says_alone(epson_sim, monkeypatch):
     assert "ROBOLINK_PASSWORD" not in epson_sim._environment()
@@ -429,24 +436,31 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path, shared):
         [
             sys.executable,
             "-m",
-            "pytest",
+            "tests._program",
+            "import sys, pytest; sys.exit(pytest.main(sys.argv[1:]))",
             "-p",
             "no:cacheprovider",
             "--robolink-seed",
             "7",
             "--strict-markers",
             "--junitxml=report.xml",
+            "-W",
+            "ignore::pytest.PytestAssertRewriteWarning",  # of what a forked process has imported
             *shared,
         ],
         cwd=tmp_path,
-        env={**os.environ, "ROBOLINK_PASSWORD": "of-another-cell"},
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+            "ROBOLINK_PASSWORD": "of-another-cell",
+        },
         capture_output=True,
         text=True,
         check=False,
         timeout=60,
     )
     shown = done.stdout
-    assert "1 failed, 11 passed, 1 skipped, 6 errors" in shown
+    assert "1 failed, 10 passed, 1 skipped, 6 errors" in shown
     assert "robolink: " not in shown  # no header
     assert "robolink wire: epson T6-602S, seed 7, epson+sim://pytest-" in shown
     assert "robolink state: softmotion Kin_Scara3_Z, seed 7" in shown

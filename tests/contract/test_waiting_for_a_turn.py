@@ -335,14 +335,17 @@ def test_the_owner_of_a_mailbox_is_waited_for():
 # Connecting, to a controller that lets one client in.
 
 
-def test_connecting_waits_for_whoever_is_logged_in():
+def test_connecting_waits_for_whoever_is_logged_in(monkeypatch):
     url = f"epson+sim://{new_operation()}"
     first = robolink.connect(url)
     with pytest.raises(RobolinkError):
         robolink.connect(url, timeout_s=0.1)
     said: list[str] = []
-    with runtime.replaced(Meanwhile(first.close)):
+    time = Meanwhile(first.close)
+    monkeypatch.setattr(time, "random_bytes", bytes)  # the shortest pause is drawn
+    with runtime.replaced(time):
         second = robolink.connect(url, timeout_s=0.1, wait_s=5, tell=said.append)
+    assert time.slept_s == pytest.approx(0.25)
     with second:
         assert second.patience.wait_s == 5
         assert second.status().ready

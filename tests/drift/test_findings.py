@@ -9,7 +9,7 @@ import pytest
 from robolink.calibration import student_t
 from robolink.drift import DriftCode, charts_of, drift_of, findings_in, measured_changes
 from robolink.drift.findings import mounted_trend
-from robolink.drift.history import LEVEL, slope_of
+from robolink.drift.history import LEVEL, likeliest_split, slope_of
 from robolink.errors import ConfigError
 from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
 from tests.drift._courses import course, found, steady
@@ -118,6 +118,10 @@ def test_the_limits_of_the_mean_widen_as_textbooks_say():
     assert chart.mean_limits_mm is not None
     reach = chart.judged[-1].mean_reach_mm
     assert chart.mean_limits_mm[1] - chart.centre_mm == pytest.approx(reach)
+
+
+def test_a_split_counts_the_first_value_as_it_is():
+    assert likeliest_split([0, 1, 0, 1, 0, 1], 1) == 2  # medians of three: 0, 0, 1, 0, 1, 1
 
 
 def test_one_bad_touch_at_the_end_hides_no_slipping_mount():

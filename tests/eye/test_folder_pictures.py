@@ -146,6 +146,16 @@ def test_a_file_that_is_still_being_written_is_waited_for(folder, written):
     assert picture.encoded == whole
 
 
+def test_a_file_counts_only_once_it_has_stayed_as_it_is(folder, written):
+    contents: list[bytes] = []
+
+    def write():
+        contents.append(written("a.pgm"))
+
+    picture = taken(folder, write, write)
+    assert picture.encoded == contents[1]
+
+
 def test_a_file_that_is_overwritten_counts_from_its_second_picture_on(folder, written):
     written("live.pgm")
     first = []

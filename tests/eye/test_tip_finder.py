@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.eye.candidate import Polarity, RefusalCode, TipShape
+from robolink.eye.candidate import Candidate, Polarity, RefusalCode, TipShape
 from robolink.eye.tip_finder import find_tips
 from robolink.eye.tip_finder.circles import Circle, _lobes
-from robolink.eye.tip_finder.own_profile import on_one_axis
-from robolink.eye.tip_finder.rays import RAYS, Edges
+from robolink.eye.tip_finder.judgement import LEAST_EDGE, Scene
+from robolink.eye.tip_finder.own_profile import centred_by_profile, on_one_axis
+from robolink.eye.tip_finder.rays import RAYS, Edges, slopes, unrolled
+from robolink.eye.tip_finder.search import _same
 from tests.eye.drawings import KINDS, Canvas, Face, blurred, drawing, face, taken
 
 SIZE = (400, 300)
@@ -208,10 +210,16 @@ def worn_errors_px(aside, count):
 
 
 def test_a_rough_rim_is_drawn_to_a_bore_on_its_axis_and_not_to_an_eccentric_one():
-    on_axis, eccentric = worn_errors_px(0.0, 8), worn_errors_px(0.08, 4)
+    on_axis, eccentric = worn_errors_px(0.0, 4), worn_errors_px(0.08, 2)
     assert np.sqrt(np.mean(on_axis**2)) < 0.52
     assert np.sqrt(np.mean(eccentric**2)) < 0.8
     assert eccentric.max() < 1.2
+
+
+def test_the_middle_moves_to_where_the_rim_is_alike_all_the_way_round():
+    beside = Circle(102.5, 82.0, 30.0, -1, 1.0, 0.5, 0.0, 0.0)
+    x_px, y_px = centred_by_profile(drawn(*tip()), beside, 1.5)
+    assert math.dist((x_px, y_px), (101.3, 82.6)) < 0.3
 
 
 def test_two_rough_circles_share_an_axis_only_as_far_as_their_scatter_says():
@@ -242,6 +250,32 @@ def test_another_size_is_not_taken():
 def test_a_radius_that_nobody_knows():
     found = accepted(drawn(*tip()), TipShape(None))
     assert abs(found[0].radius_px - 30.0) < 0.4
+
+
+def test_of_the_smallest_picture_it_is_told_why_its_tip_is_none():
+    grey = drawn(*tip(5.5, 5.5, 5.0, 2.0), size=(12, 12), noise=0.5)
+    assert RefusalCode.FEW_RAYS in reasons(grey, TipShape(5.0), 5.5, 5.5)
+    assert find_tips(grey[:9], TipShape(5.0)) == ()
+
+
+def test_a_slope_counts_by_the_faintest_edge_where_there_is_no_noise():
+    scene = Scene(np.zeros((9, 9), np.uint8), TipShape(20.0), 20.0, noise=0.0, smooth_px=1.0)
+    assert scene.least_slope(0.6) == pytest.approx(0.25 * LEAST_EDGE / 0.6)
+    assert scene.least_slope(9.0) == 0.5
+
+
+@pytest.mark.parametrize(("off_px", "same"), [(0.0, True), (4.9, True), (5.1, False)])
+def test_circles_within_a_twentieth_of_a_radius_are_one(off_px, same):
+    one = Candidate(60.0, 50.0, 100.0, score=1.0)
+    assert _same(replace(one, x_px=60.0 + off_px), one) is same
+    assert _same(replace(one, radius_px=100.0 + off_px), one) is same
+
+
+def test_outside_of_the_picture_nothing_slopes():
+    rays = unrolled(drawn(*tip()), 195.0, 80.0, 1.0, 30.0, 0.5)
+    slope = slopes(rays, 1.0)
+    assert not slope[~rays.inside].any()
+    assert slope[rays.inside].any()
 
 
 @pytest.mark.parametrize("level", [0, 7, 128, 255])

@@ -174,7 +174,7 @@ def test_f80_a_recovery_killed_anywhere_may_be_run_again(tmp_path, left):
             cell.act()
             written = cell.writes()
             assert written == expected
-            sample = Sample(partial(matters_to, cell), every=4)
+            sample = Sample(partial(matters_to, cell), every=5)
             die(cell, "recover", sample, partial(check_killed_recovery, cell, program, written))
             check_recovered(cell, program, written)
 
@@ -213,7 +213,7 @@ def test_f79_an_order_killed_anywhere_and_delivered_again_is_carried_out_once(
 def test_f57_a_restore_killed_anywhere_keeps_what_is_done_and_is_ended_by_another(tmp_path, kind):
     with KINDS[kind](tmp_path / "cell") as cell:
         assert NOTHING_LEFT in cell.recover()
-        sample = Sample(partial(matters_to, cell), every=2)
+        sample = Sample(partial(matters_to, cell), every=3)
         die(cell, "restore", sample, partial(restores.check_killed_restore, cell))
         assert restores.stage(cell) == restores.STAGES[-1]
 

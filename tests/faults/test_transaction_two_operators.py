@@ -56,7 +56,7 @@ ALIKE = ("one tool", "two tools")
 @pytest.mark.fault("F46")
 def test_f46_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp_path, pair):
     whole = ALL or pair == "one tool"
-    orders = Interleavings(alike=pair in ALIKE, most=None if whole else 5)
+    orders = Interleavings(alike=pair in ALIKE, most=None if whole else 3)
     ends = follow_orders(
         orders, lambda number: change_cell(tmp_path / str(number), SharedSimulator), PAIRS[pair]
     )

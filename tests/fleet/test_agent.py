@@ -298,7 +298,7 @@ def permit(store):
     )
 
 
-def test_a_cell_that_is_off_is_tried_again_after_its_pause(location):
+def test_a_cell_that_is_off_is_tried_again_after_its_pause_and_once_the_clock_is_set_back(location):
     off = JobOutcome(3, "ConnectError", what="not reached")
     cells, ahead = Cells(b=[off, off, JobOutcome(0)]), [timedelta()]
     made = plan()
@@ -306,11 +306,14 @@ def test_a_cell_that_is_off_is_tried_again_after_its_pause(location):
         store.add_plan(made)
     agent = Agent(location, "plant", cells, clock=lambda: datetime.now(UTC) + ahead[0])
     with running(agent):
-        for attempt in (1, 2, 3):
-            until(lambda: cells.done[made.order("b")] >= attempt)  # noqa: B023
-            if attempt == 1:
-                assert states(location, made)[0]["b"] in (JobState.WAITING, JobState.RUNNING)
+        with FleetStore(location) as store:
+            tried = lambda: store.progress(made.id).jobs[1]  # noqa: E731
+            until(lambda: tried().treatment)
+            assert tried().attempt == 1
             ahead[0] += timedelta(minutes=3)
+            until(lambda: tried().attempt == 2 and tried().state is JobState.WAITING)
+            ahead[0] -= timedelta(days=1)
+            until(lambda: tried().attempt == 3)
     assert states(location, made)[0]["b"] is JobState.KEPT
     assert cells.done[made.order("b")] == 3
 
@@ -352,22 +355,9 @@ def test_a_job_that_moves_a_robot_is_a_persons_and_an_agent_only_ends_it_as_miss
     assert not cells.done
 
 
-def test_a_clock_that_is_set_back_delays_no_second_try(location):
-    off = JobOutcome(3, "ConnectError", what="not reached")
-    cells, ahead = Cells(b=[off, JobOutcome(0)]), [timedelta()]
-    made = plan()
-    with FleetStore(location) as store:
-        store.add_plan(made)
-        agent = Agent(location, "plant", cells, clock=lambda: datetime.now(UTC) + ahead[0])
-        with running(agent):
-            until(lambda: store.progress(made.id).jobs[1].treatment)
-            ahead[0] -= timedelta(days=1)
-            until(lambda: store.progress(made.id).finished)
-    assert cells.done[made.order("b")] == 2
-
-
-def test_a_turn_without_the_database_is_none_for_those_who_watch_the_agent(tmp_path):
+def test_a_turn_without_the_database_is_none_for_those_who_watch_the_agent(tmp_path, engine_file):
     place, told = tmp_path / "plant.db", list[str]()
+    shutil.copy(engine_file, tmp_path / "plant.db.jobs")
     place.write_bytes(b"no database, and longer than the head of one" * 10)
     agent = Agent(str(place), "plant", lambda *_: JobOutcome(0), tell=told.append)
     agent._run(lambda _still: True)

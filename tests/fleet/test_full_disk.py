@@ -51,7 +51,7 @@ def require_once(found):
 @pytest.mark.fault("F61")
 @pytest.mark.timeout(300)
 def test_a_change_on_a_disk_that_becomes_full_is_written_once_or_not(tmp_path):
-    full = {"earlier": [2], "commits": [*range(1, COMMITS + 1)], "free_pages": [0]}
+    full = {"earlier": [0], "commits": [*range(1, COMMITS + 1)], "free_pages": [0]}
     nearly = {"earlier": [2], "commits": [2], "free_pages": [24]}
     found = found_on(tmp_path / "disk", full, nearly)
     assert len(found) == COMMITS + 1

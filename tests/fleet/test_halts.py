@@ -226,9 +226,9 @@ def test_what_was_measured_is_compared_with_what_was_measured_before():
 
 def test_right_plans_go_through_and_wrong_ones_halt_within_five_cells():
     """A small part of what ``python -m tests.fleet._populations`` counts."""
-    assert [course_of(Population(cells=100), seed)[0] for seed in range(5)] == [None] * 5
+    assert [course_of(Population(cells=100), seed)[0] for seed in range(3)] == [None] * 3
     wrong = Population(wrong_mm=0.3, sigma_mm=(0.08, 0.08))
-    assert max(course_of(wrong, seed)[1] for seed in range(40)) <= 5
+    assert max(course_of(wrong, seed)[1] for seed in range(24)) <= 5
 
 
 @pytest.mark.soak

@@ -244,10 +244,12 @@ def test_a_cell_whose_home_is_another_computer_is_left_to_that_one(home):
 
 def test_checks_and_unfinished_jobs_are_noted(home):
     controller = home.add("a")
+    home.add("b")
     address = parse_url(load_cell_files().cells["a"].url).address
     journal = open_journal(address=address)
     journal.record_checks([NewCheck(address, "a", True, "No problem found.")])
     journal.record_checks([NewCheck(address, "a", False, "Needs attention: tool_changed.")])
+    journal.record_checks([NewCheck("epson+tcp://192.168.0.99:5000", "", True, "Of no cell.")])
     state = home.states()["a"]
     assert (state.well, state.verdict) == (False, "Needs attention: tool_changed.")
     assert state.unsettled_since == ""

@@ -153,9 +153,12 @@ def later(monkeypatch):
     time.tzset()
 
 
+HELD_BACK = ("cancelled", "revoked", "another permit")
+
+
 @pytest.mark.parametrize(
     "meanwhile",
-    ["halted", "cancelled", "revoked", pytest.param("another permit", marks=SOAK), "window"],
+    ["halted", *(pytest.param(one, marks=SOAK) for one in HELD_BACK), "window"],
 )
 def test_what_holds_a_plan_back_after_it_was_shown_holds_the_job_back(cells, later, meanwhile):
     hour = datetime.now().astimezone().hour
@@ -273,7 +276,7 @@ def test_without_the_plants_database_nothing_begins(cells, location, server_of):
     check_waiting(cells, plan)
 
 
-@pytest.mark.parametrize("reporter", ["status", "next"])
+@pytest.mark.parametrize("reporter", ["status", pytest.param("next", marks=SOAK)])
 def test_an_end_that_could_not_be_reported_is_reported_from_the_record(
     cells, location, server_of, reporter
 ):
@@ -438,7 +441,7 @@ def kept_by(gate, controller, then=None):
         pytest.param(
             NotReadyError("Open.", reason=NotReadyReason.GUARD_OPEN), 0, JobState.KEPT, marks=SOAK
         ),
-        (ZeroDivisionError("a defect"), 0, JobState.KEPT),
+        pytest.param(ZeroDivisionError("a defect"), 0, JobState.KEPT, marks=SOAK),
         (OutcomeUnknownError("Nobody knows where it stands."), 6, JobState.UNSETTLED),
     ],
 )

@@ -22,7 +22,7 @@ from robolink.fleet import (
     report_of,
 )
 from robolink.fleet.plant_view.copies import CopiedJournal, copied_journals, own_journals
-from robolink.fleet.plant_view.report_page import MOST_ROWS, render_plant
+from robolink.fleet.plant_view.report_page import MOST_ROWS, render_plant, some_names
 from robolink.journal import open_journal
 from robolink.journal._outbox import home_of
 from robolink.locale.languages import speak
@@ -279,3 +279,8 @@ def test_copies_say_what_the_journal_says(home, server):
     assert list(map(dataclasses.asdict, here.entries)) == list(
         map(dataclasses.asdict, there.entries)
     )
+
+
+def test_of_many_names_the_first_are_shown_and_the_others_counted():
+    assert some_names(["a", "b"], 2) == "a, b"
+    assert some_names(["a", "b", "c"], 2) == "a, b and 1 more"

@@ -14,6 +14,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
@@ -115,6 +116,20 @@ def test_where_the_stop_itself_hangs_rest_is_not_proved(writes, code, stepped):
         assert job.ended(JobOutcome(0)) is job.outcome
     assert (job.attempt, job.outcome.code) == (1, code)
     assert ("press the emergency stop" in job.outcome.what) is writes
+
+
+def test_no_job_comes_or_goes_while_they_are_looked_at(stepped):
+    silent, lock = SilentJobs(Line()), threading.Lock()
+
+    class Jobs(dict[str, Any]):
+        def items(self):
+            assert lock.locked()
+            return super().items()
+
+    silent._jobs, silent._lock = Jobs(), lock
+    with silent.watching("P/a", 1, writes=True):
+        silent.look()
+        assert silent.cut() == {}
 
 
 CUT, CUT_HALT = JobOutcome(6, "OutcomeUnknownError", what="cut"), JobOutcome(2, "PlantError")

@@ -51,7 +51,7 @@ def test_the_dialogue_is_right():
     assert len(transport.sent) == ANSWERS
 
 
-@fuzzed(30, 5_000, case=bent())
+@fuzzed(8, 5_000, case=bent())
 def test_whatever_a_server_answers_is_taken_or_refused_and_nothing_is_sent_twice(case):
     number, data = case
     transport = ScriptedTransport(

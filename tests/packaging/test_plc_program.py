@@ -333,7 +333,9 @@ def test_the_unit_is_told_as_a_real():
         assert (made.value("low"), made.value("high")) == words
 
 
-@pytest.mark.parametrize("name", [*LISTS, SYMBOL_LIST, PROGRAM_FILES[-1]])
+@pytest.mark.parametrize(
+    "name", [*LISTS, SYMBOL_LIST, pytest.param(PROGRAM_FILES[-1], marks=pytest.mark.soak)]
+)
 def test_a_foreign_parser_reads_the_lists(name):
     assert parse_source_code(program_texts(FULL, opcua=True)[name]).exception is None
 

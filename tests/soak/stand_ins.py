@@ -156,10 +156,10 @@ def forgotten_selection(preserver: Any, marker: Marker) -> None:
     preserver._link.markers.clear(marker)
 
 
-def written_again_after_silence(sender: Any, command: Any, before: Any) -> Any:
+def written_again_after_silence(sender: Any, command: Any, before: Any, *, again: bool) -> Any:
     """Take silence for a damaged block, which may be written again."""
     try:
-        return _await_acknowledgement(sender, command, before)
+        return _await_acknowledgement(sender, command, before, again=again)
     except TransportTimeoutError:
         return before, False
 

@@ -10,6 +10,8 @@ from datetime import UTC, datetime, timedelta
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from tests.unit._rsa_keys import rsa_key
+
 if TYPE_CHECKING:
     from asyncua.crypto.permission_rules import User
 
@@ -107,12 +109,11 @@ class Own:
 
 @cache
 def own(name: str) -> Own:
-    """Return a certificate as OPC UA wants it, with its URI ``urn:NAME``."""
+    """Return a certificate as OPC UA wants it, with its URI ``urn:NAME`` and its own key."""
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
-    from cryptography.hazmat.primitives.asymmetric import rsa
 
-    key = rsa.generate_private_key(65537, 2048)
+    key = rsa_key(("server", "robolink").index(name))
     subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
     now = datetime.now(UTC)
     made = (

@@ -14,6 +14,7 @@ from robolink.config import (
     load_cells,
     names_meant,
     reach_cell,
+    remember_reach,
     select_cells,
 )
 from robolink.errors import ConfigError
@@ -278,6 +279,20 @@ def test_a_stop_waits_as_usual_where_a_cell_says_nothing_of_it(places, monkeypat
     places["named"].write_text('[cells.a]\nurl = "epson+tcp://192.0.2.1:5000"\n')
     monkeypatch.setenv("ROBOLINK_CONFIG", str(places["named"]))
     assert (reach_cell("a").url, reach_cell("a").timeout_s) == ("epson+tcp://192.0.2.1:5000", 0.0)
+
+
+def test_a_stop_takes_password_and_home_from_the_file_and_from_the_last_connection(
+    places, monkeypatch
+):
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(places["named"]))
+    said = f'url = "{URL}"\npassword_file = "/s"\npassword_env = "PW"\nhome = "pc-1"\n'
+    places["named"].write_text(f"[cells.a]\n{said}")
+    for _ in range(2):
+        reach = reach_cell("a")
+        assert (reach.password_file, reach.password_env, reach.home) == ("/s", "PW", "pc-1")
+        remember_reach("a", places["named"], reach)
+        places["named"].write_text("[cells.a")  # damaged since
+    assert reach.doubt
 
 
 # Several cells at once: names, patterns, groups.

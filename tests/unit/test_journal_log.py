@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robolink.errors import JournalError
 from robolink.journal import ChainVerification, memory_journal, open_journal
 from robolink.journal.store.statements import COLUMNS as STORED
-from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Signature, new_operation
+from robolink.model import EntryKind, Hand, Marker, MarkerKind, NewEntry, Signature, new_operation
 
 # Markers and entries as a driver stores them: each step is one transaction.
 
@@ -378,13 +378,21 @@ def test_details_that_are_no_plain_json_are_refused_and_leave_nothing(value):
         ({9: 1, 10: 2, 100: 3}, {"9": 1, "10": 2, "100": 3}),
         ({"of": {2.5: "b", 10: "a"}}, {"of": {"2.5": "b", "10": "a"}}),
         ({"at": (1.0, -0.0)}, {"at": [1.0, -0.0]}),
+        ({}, {}),
+        ({"Z": 1.5, "a": 2}, {"Z": 1.5, "a": 2}),
         ({"at": [0.1, 1e22], "on": True}, {"at": [0.1, 1e22], "on": True}),
+        ({"of": [{10: 1, 9: 2}], "kind": Hand.LEFT}, {"of": [{"10": 1, "9": 2}], "kind": "left"}),
     ],
 )
-def test_a_marker_is_whole_however_its_details_were_given(log, given, read):
+def test_a_marker_is_whole_however_its_details_were_given(journal, log, given, read):
     log.begin(Marker("a", MarkerKind.MOVE, "Move", "2025-01-01T00:00:00+00:00", given))
     (found,) = log.open_markers()
     assert json.dumps(found.details, sort_keys=True) == json.dumps(read, sort_keys=True)
+    with journal._store.read() as tables:
+        (row,) = tables.connection.table("markers")
+    stored = json.loads(row["details"])
+    assert row["details"] == json.dumps(stored, sort_keys=True, separators=(",", ":"))
+    assert {**read, "_sum": stored["_sum"]} == stored
 
 
 def held(journal):

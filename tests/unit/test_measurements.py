@@ -6,8 +6,16 @@ from typing import Any
 
 import pytest
 
-from robolink.calibration import NeedleChain, NeedleLimits, Pin, solve_two_pose
-from robolink.calibration_run import Limits
+from robolink.calibration import (
+    NeedleChain,
+    NeedleLimits,
+    Pin,
+    carrying,
+    solve_n_angle,
+    solve_two_pose,
+)
+from robolink.calibration_run import Limits, Proposal
+from robolink.calibration_run._records import touch_details
 from robolink.controllers import SimpleController, SimpleMachine
 from robolink.errors import CalibrationError, DeclinedError
 from robolink.methods import (
@@ -171,6 +179,16 @@ def test_a_tip_is_as_sure_as_its_pin(pin_sigma_mm, controller):
     assert (found.half_width95 == ()) is (pin_sigma_mm is None)
     assert source.clearance_mm == 4.0, "it is compared with the largest change before it begins"
     assert source.can_add_touch is False, "the touch can be made again, and none added"
+
+
+def test_touches_that_only_their_residuals_judge_are_recorded_as_less_sure_than_those():
+    around = [carrying(Pose(0, 0, 0, u_deg), STORED, PIN) for u_deg in (0, 120, 240)]
+    bent = [replace(around[0], x_mm=around[0].x_mm + 0.02), *around[1:]]
+    result = solve_n_angle(bent)
+    recorded: Any = touch_details("PIN-07", Proposal(1, STORED, result))["touch_sigma_mm"]
+    assert result.sigma_mm is not None
+    # Of three touches one number is to spare: Student's t for a 95 % interval is 12.7, not 1.96.
+    assert recorded > 2 * result.sigma_mm
 
 
 def site_at(controller, **pin):

@@ -219,6 +219,7 @@ def test_a_catalogue_is_compiled_again_when_its_source_changed(tmp_path, monkeyp
     source.write_text(head + 'msgid "Stop."\nmsgstr "停止"\n', encoding="utf-8")
     assert said() == "停止"
     assert (folder / "robolink.mo").is_file()
+    assert said() == "停止"  # read from there, and kept while it is the same
     source.write_text(head + 'msgid "Stop."\nmsgstr "已停止。"\n', encoding="utf-8")
     later = time.time() + 60
     os.utime(source, (later, later))

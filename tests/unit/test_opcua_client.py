@@ -52,6 +52,22 @@ def test_a_node_is_named_by_its_id_or_by_its_way(client: "OpcuaClient") -> None:
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "i=2253",
+        "ns=4;i=17",
+        "ns=2;s=a;b=c",
+        "ns=2;g=09087e75-8e5e-499b-954f-f2a9603db28a",
+        "ns=2;b=cm9ib2xpbms=",
+    ],
+)
+def test_an_id_of_each_kind_is_read(text: str) -> None:
+    from robolink.transport.opcua.address_space import node_id, spelled
+
+    assert spelled(node_id(text)) == text
+
+
+@pytest.mark.parametrize(
     "value", [[1.0] * 23, [1.0] * 25, 1.0, "text", [True] * 24, [[1.0] * 24], None]
 )
 def test_a_value_that_does_not_fit_its_node_is_not_sent(
@@ -61,6 +77,30 @@ def test_a_value_that_does_not_fit_its_node_is_not_sent(
     with pytest.raises(ConfigError, match="does not fit"):
         client.write(symbol("tool"), value)
     assert opcua_served.value("tool") == before
+
+
+@pytest.mark.parametrize(
+    ("kind", "least", "most"),
+    [
+        ("SByte", -128, 127),
+        ("Byte", 0, 255),
+        ("Int16", -32768, 32767),
+        ("UInt16", 0, 65535),
+        ("Int32", -2147483648, 2147483647),
+        ("UInt32", 0, 4294967295),
+        ("Int64", -9223372036854775808, 9223372036854775807),
+        ("UInt64", 0, 18446744073709551615),
+    ],
+)
+def test_a_whole_number_fits_from_the_least_to_the_largest(
+    kind: str, least: int, most: int
+) -> None:
+    from robolink.transport.opcua.values import fits
+
+    assert fits(kind, least)
+    assert fits(kind, most)
+    assert not fits(kind, least - 1)
+    assert not fits(kind, most + 1)
 
 
 def test_what_a_program_does_not_publish_for_writing_is_not_written(client: "OpcuaClient") -> None:

@@ -35,6 +35,11 @@ def scripted(instead: dict[int, bytes], **granted: Any) -> ScriptedTransport:
     return ScriptedTransport([instead.get(at, one) for at, one in enumerate(answers)])
 
 
+def named(value: object) -> str | None:
+    """Return the name of an answer in the name of its test: its bytes hold the time."""
+    return "answer" if isinstance(value, bytes) else None
+
+
 @pytest.mark.parametrize(
     ("at", "answer", "expected", "words"),
     [
@@ -45,6 +50,7 @@ def scripted(instead: dict[int, bytes], **granted: Any) -> ScriptedTransport:
         (LOGIN, fault(3, "BadSecurityChecksFailed"), RejectedError, "BadSecurityChecksFailed"),
         (LOGIN, b"", ConnectError, "nobody opens a session"),
     ],
+    ids=named,
 )
 def test_a_server_that_opens_no_session_says_why(at, answer, expected, words):
     transport = scripted({at: answer})
@@ -68,6 +74,7 @@ def test_a_server_that_opens_no_session_says_why(at, answer, expected, words):
         (told_error("BadNotWritable"), TransportBrokenError, False),
         (b"", TransportTimeoutError, False),
     ],
+    ids=named,
 )
 def test_only_a_refusal_says_that_a_write_was_not_done(answer, expected, stays):
     transport = scripted({WRITE: answer})

@@ -5,6 +5,7 @@ import stat
 import threading
 from base64 import encodebytes
 from datetime import timedelta
+from itertools import cycle
 
 import pytest
 from cryptography import x509
@@ -22,19 +23,20 @@ from robolink.errors import ConfigError
 from robolink.remedy_words import RemedyWord
 from robolink.timing import wall_time
 from robolink.transport.opcua import own_certificate as own
-
-
-@pytest.fixture(scope="module")
-def keys():
-    """A few keys, since each takes a tenth of a second."""
-    return [rsa.generate_private_key(public_exponent=65537, key_size=2048) for _ in range(3)]
+from tests.unit._rsa_keys import rsa_key
 
 
 @pytest.fixture(autouse=True)
-def drawn(monkeypatch, keys, tmp_path):
+def drawn(monkeypatch, tmp_path):
+    """Hand out keys in turn, and refuse to draw weak ones."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    handed = iter(keys * 4)
-    monkeypatch.setattr(rsa, "generate_private_key", lambda **_: next(handed))
+    handed = cycle([rsa_key(0), rsa_key(1)])
+
+    def draw(*, public_exponent, key_size):
+        assert (public_exponent, key_size) == (65537, 2048)
+        return next(handed)
+
+    monkeypatch.setattr(rsa, "generate_private_key", draw)
 
 
 def test_it_is_made_once_and_only_its_owner_can_read_the_key():
@@ -133,7 +135,8 @@ def test_one_that_others_can_read_or_that_is_damaged_is_refused_and_not_replaced
         assert made.path.read_bytes() == spoilt
 
 
-def test_of_a_damaged_key_nothing_is_used_that_does_not_fit_its_certificate():
+@pytest.mark.parametrize("step", [797, pytest.param(29, marks=pytest.mark.soak)])
+def test_of_a_damaged_key_nothing_is_used_that_does_not_fit_its_certificate(step):
     """Each bit that turns is refused by name, or leaves a key that works as before."""
     made = own.own_certificate()
     certificate = x509.load_der_x509_certificate(made.der)
@@ -144,7 +147,7 @@ def test_of_a_damaged_key_nothing_is_used_that_does_not_fit_its_certificate():
     oaep = padding.OAEP(padding.MGF1(hashes.SHA256()), hashes.SHA256(), None)
     sealed = public_key.encrypt(b"nonce", oaep)
     ended = set()
-    for bit in range(3, 8 * len(der), 397):
+    for bit in range(3, 8 * len(der), step):
         bent = bytearray(der)
         bent[bit // 8] ^= 1 << bit % 8
         wrapped = encodebytes(bent)

@@ -14,6 +14,7 @@ from robolink.calibration import rotation_of
 from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
 from robolink.model import Hand, Pose
 from robolink.pose_tables import RULES, ReadingChoices, read_poses
+from robolink.pose_tables.orientation import order_for
 
 # Tables of poses: columns, units, separators and encodings; what is asked, what is refused.
 
@@ -424,3 +425,16 @@ def test_without_what_it_does_not_say_a_table_is_refused_with_that_question(name
     with pytest.raises(AmbiguousPosesError) as caught:
         read_poses(DATA / name)
     assert set(caught.value.asks) == set(EXPECTED[name]["options"])
+
+
+@pytest.mark.parametrize(
+    ("rule", "letters", "order"),
+    [
+        ("epson", "c a b", (1, 2, 0)),  # another maker's letters, from the first matrix to the last
+        ("kuka", "w u v", (1, 2, 0)),
+        ("mitsubishi", "u v w", None),
+        ("epson", "r p w", None),
+    ],
+)
+def test_letters_of_another_maker_count_where_their_order_is_plain(rule, letters, order):
+    assert order_for(RULES[rule], letters.split()) == order

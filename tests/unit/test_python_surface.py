@@ -9,7 +9,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, FrozenInstanceError, dataclass, field, fields, replace
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -532,6 +532,20 @@ def test_a_journal_says_where_it_is_and_its_log_of_whom(tmp_path):
         log.append(NewEntry(EntryKind.RAW, verdict="seen"))
     with closing(open_journal(str(tmp_path / "journal.db"), read_only=True)) as journal:
         assert repr(journal).endswith(", read only>")
+
+
+def test_a_pose_takes_and_stores_each_of_its_fields_although_its_init_is_written_out():
+    rows = fields(Pose)
+    asked = [(it.name, it.default) for it in inspect.signature(Pose).parameters.values()]
+    unset = [inspect.Parameter.empty if it.default is MISSING else it.default for it in rows]
+    assert asked == list(zip([it.name for it in rows], unset, strict=True))
+    values: dict[str, Any] = {it.name: float(number) for number, it in enumerate(rows)}
+    made = Pose(*values.values())
+    for one in (made, Pose(**values), replace(made), copy.copy(made)):
+        assert {it.name: getattr(one, it.name) for it in rows} == values
+    assert pickle.loads(pickle.dumps(made)) == made
+    with pytest.raises(FrozenInstanceError):
+        setattr(made, rows[-1].name, 0)
 
 
 # The tree of errors drawn at the top of the module matches the code.

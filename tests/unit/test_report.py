@@ -23,10 +23,11 @@ from robolink.calibration import (
 from robolink.errors import ConfigError
 from robolink.files.named import require_free
 from robolink.locale.languages import speak
-from robolink.model import ControllerFacts, Hand, Pose, ToolOffset
-from robolink.report import Outcome, Report, render, save
+from robolink.model import ControllerFacts, Hand, Pose, Signature, ToolOffset
+from robolink.report import Outcome, Record, Report, render, save
 from robolink.report.pictures.drawing import dot_names, step_down, step_up
-from robolink.report.pictures.plans import pose_drawings
+from robolink.report.pictures.looks import LookCircle, LookPicture, look_markup
+from robolink.report.pictures.plans import pose_drawings, tip_drawings
 from robolink.report.pictures.residuals import fit_drawings, interval_ellipse, order_drawings
 
 # The report as a page: well formed, escaped, self-contained, and equal to its numbers.
@@ -265,6 +266,17 @@ def test_how_it_ended_stands_at_the_top(outcome):
     assert text.index(OUTCOMES[outcome]) < text.index("Because.") < text.index("controller epson")
 
 
+def test_the_arrow_of_a_change_begins_where_the_tip_was():
+    record = Record("C-1", Signature(), people=(), entries=(), check="")
+    (drawing,) = tip_drawings(report(record=record))
+    picture = tostring(drawing.svg, encoding="unicode")
+    assert "from before (grey) to after: X +0.300 mm, Y -0.400 mm" in drawing.caption
+    (before,) = re.findall(r'class="old"><circle cx="([^"]*)" cy="([^"]*)"', picture)
+    assert before == ("125.00", "125.00")  # the middle
+    (arrow,) = re.findall(r'class="shaft" x1="([^"]*)" y1="([^"]*)"', picture)
+    assert arrow == before
+
+
 def test_the_drifts_are_shown_with_what_is_allowed():
     drifts = (Drift(90, 0.3, -0.4), Drift(0, 0.01, 0.0))
     page = Page(render(report(verification=VerifyResult(drifts, 0.2))))
@@ -446,3 +458,9 @@ def test_a_dot_has_its_name_where_there_is_room_and_none_elsewhere():
     names = [name.text for name in dot_names(places, [f"dot {n}" for n in range(21)])]
     assert names[:2] == ["dot 0", "dot 1"]
     assert len(names) < 21
+
+
+def test_the_cross_of_a_small_circle_is_as_long_as_its_radius():
+    circles = (LookCircle(40.0, 30.0, 2.0, accepted=True), LookCircle(10.0, 30.0, 2.0, False))
+    shown = look_markup(LookPicture(b"", 800, 600, circles))
+    assert re.findall(r' d="([^"]*)"', shown) == ["M39.0 30.0H41.0M40.0 29.0V31.0"]

@@ -11,7 +11,6 @@ import threading
 from collections import deque
 
 import pytest
-from robolink_cli import main
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.streams.epson import serve_tcp
@@ -120,38 +119,66 @@ def test_a_cell_inside_of_a_program_leaves_its_collector_alone(nothing_set_aside
         assert gc.get_freeze_count() == 0
 
 
+SERVING = """
+import gc
+import json
+import sys
+
+from robolink_cli import main
+
+looks = []
+
+
+class Looking:
+    encoding, errors = "utf-8", "strict"
+
+    def write(self, text):
+        looks.append((text if isinstance(text, str) else text.decode(), gc.get_freeze_count()))
+        return len(text)
+
+    def flush(self):
+        pass
+
+    def isatty(self):
+        return False
+
+
+# As in a process that has left its collector alone; the one that was forked has not.
+gc.unfreeze()
+gc.set_threshold(700, 10, 10)
+shown, sys.stdout = sys.stdout, Looking()
+code = main.run(sys.argv[1:])
+sys.stdout = shown
+print(json.dumps([code, looks, gc.get_freeze_count()]))
+"""
+
+
 @pytest.mark.parametrize("of_a_file", [False, True])
-def test_commands_that_serve_set_aside_while_they_serve(
-    of_a_file, nothing_set_aside, monkeypatch, tmp_path
-):
-    """The first line is printed once everything is served."""
-    looks = []
+def test_commands_that_serve_set_aside_while_they_serve(of_a_file, tmp_path):
+    """The first line is printed once everything is served.
 
-    class Looking:
-        encoding, errors = "utf-8", "strict"
-
-        def write(self, text):
-            looks.append((text, gc.get_freeze_count()))
-            return len(text)
-
-        def flush(self):
-            pass
-
-        def isatty(self):
-            return False
-
-    monkeypatch.setattr(sys, "stdout", Looking())
+    In a separate process, for this one holds all the tests.
+    """
     cells = tmp_path / "cells.toml"
     cells.write_text(
         'schema = "robolink/sim-cells/1"\n[cells.one]\nkind = "epson"\ntcp = "127.0.0.1:0"\n',
         encoding="utf-8",
     )
     what = ["run", str(cells)] if of_a_file else ["epson", "--tcp", "127.0.0.1:0"]
-    assert main.run(["sim", *what, "--idle-exit", "0.1", "--json"]) == 0
+    words = ["sim", *what, "--idle-exit", "0.1", "--json"]
+    told = subprocess.run(
+        [sys.executable, "-m", "tests._program", SERVING, *words],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    ).stdout
+    code, looks, left = json.loads(told)
     first, set_aside = next((text, count) for text, count in looks if text)
+    assert code == 0
     assert json.loads(first)["simulated"]
     assert set_aside > 1000
-    assert gc.get_freeze_count() == 0
+    assert left == 0
 
 
 # Readiness of sockets: nobody misses a turn, whichever means of the system is used.

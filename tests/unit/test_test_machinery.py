@@ -14,7 +14,8 @@ from hypothesis.internal.conjecture import providers
 
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.model import Secret
-from tests.conftest import CANARIES, hear_signals
+from tests import _warm_process
+from tests.conftest import CANARIES, PATH, hear_signals, pytest_runtest_teardown
 from tests.mutants.changes import Kind, mutants_of
 from tests.mutants.places import drawn
 
@@ -73,6 +74,23 @@ def test_a_command_that_is_started_is_a_child_of_this_process_with_all_imported(
         check=True,
     ).stdout
     assert max(map(len, told.splitlines())) <= 50
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_folder_that_a_command_added_keeps_no_later_one_from_being_forked(tmp_path, request):
+    def forked():
+        paths = os.pathsep.join(path for path in sys.path if path)
+        return _warm_process._warm({**os.environ, "PYTHONPATH": paths}) is not None
+
+    assert forked()
+    sys.path.append(str(tmp_path))
+    assert not forked()
+    ending = pytest_runtest_teardown(request.node)
+    next(ending)
+    with pytest.raises(StopIteration):
+        next(ending)
+    assert forked()
+    assert sys.path == PATH
 
 
 SHARED = {

@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import click
@@ -10,7 +11,7 @@ import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure import run_events
 from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
-from robolink_cli.commands.measure.recipe_choice import choose_recipe
+from robolink_cli.commands.measure.recipe_choice import _rows_of, choose_recipe
 from robolink_cli.options.shared import GIVEN, TYPED
 from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
@@ -555,3 +556,20 @@ def test_a_calibration_ends_with_its_result_at_the_desk(tmp_path, monkeypatch):
     finally:
         unregister("desk-of-a-calibration")
     assert isinstance(desk.subjects[-1], ChangeReport)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        ("n", ("n   (n.toml)       about 2 min", "two   (two.toml)")),
+        ("n" * 70, (f"about 2 min   {'n' * 70}   (n.toml)", "two   (two.toml)")),
+    ],
+    ids=["behind its name", "before a long one"],
+)
+def test_how_long_a_recipe_takes_is_never_cut_off(name, rows):
+    recipes: Any = [
+        SimpleNamespace(name=one, path=Path(file))
+        for one, file in ((name, "n.toml"), ("two", "two.toml"))
+    ]
+    pasts: Any = [SimpleNamespace(usual_s=120.0), SimpleNamespace(usual_s=None)]
+    assert _rows_of(recipes, pasts) == rows

@@ -16,6 +16,7 @@ from typing import Any
 from uuid import uuid4
 
 _NOBODY = 65534  # PostgreSQL refuses to run as root
+_MEMORY = "/dev/shm"
 _START_S = 30.0
 
 ASKED_FOR_PASSWORD = "locked_out"
@@ -58,11 +59,7 @@ class Server:
 
     def execute(self, statement: str, database: str = "postgres") -> None:
         """Run statements outside any journal."""
-        import psycopg
-
-        url = self.url(database).replace("+psycopg", "")
-        with psycopg.connect(url, autocommit=True) as connection:
-            connection.execute(statement.encode())
+        asked(self.url(database), statement)
 
     def start(self) -> None:
         """Start it and wait until it answers."""
@@ -138,8 +135,11 @@ def _hang_up() -> None:
 
 @contextmanager
 def served() -> Iterator[Server]:
-    """Run a server during the block."""
-    folder = Path(tempfile.mkdtemp(prefix="robolink-postgresql-"))
+    """Run a server during the block; its data is in memory where that of the tests is."""
+    # A new database takes 0.03 s of CPU there and 0.03 to 0.18 s on a disk. Another folder of the
+    # tests may be closed to who runs the server.
+    memory = _MEMORY if os.environ.get("PYTEST_DEBUG_TEMPROOT") == _MEMORY else None
+    folder = Path(tempfile.mkdtemp(prefix="robolink-postgresql-", dir=memory))
     try:
         if os.geteuid() == 0:
             os.chown(folder, _NOBODY, _NOBODY)
@@ -150,6 +150,8 @@ def served() -> Iterator[Server]:
         assert made.wait(timeout=_START_S) == 0
         with (folder / "data" / "postgresql.conf").open("a") as settings:
             settings.write("listen_addresses = '127.0.0.1'\nfsync = off\n")
+            # Each new database would get a worker of its own every minute.
+            settings.write("autovacuum = off\n")
             settings.write(f"unix_socket_directories = '{folder}'\n")
         trust = folder / "data" / "pg_hba.conf"
         asking = f"host all {ASKED_FOR_PASSWORD} 127.0.0.1/32 scram-sha-256\n"

@@ -2,15 +2,17 @@
 
 import datetime
 import sqlite3
+import threading
 from contextlib import closing
+from typing import Any
 
 import pytest
 
 from robolink import runtime
 from robolink.errors import JournalError
-from robolink.journal import close_files, move_journal, open_journal
+from robolink.journal import Meetings, close_files, memory_journal, move_journal, open_journal
 from robolink.journal.store.check_rows import ClosedDay, problems_of_days
-from robolink.model import EntryKind, NewCheck, NewEntry, Signature
+from robolink.model import EntryKind, Identity, NewCheck, NewEntry, Signature
 
 WELL = NewCheck("epson:C-1/R-1", "line3", True, "No problem found.", {"tools": {"1": [1.5]}})
 ILL = NewCheck("epson:C-2/R-2", "line4", False, "Needs attention: tool_changed.")
@@ -326,3 +328,25 @@ def test_a_record_that_leaves_a_shared_journal_begins_checks_of_its_own(tmp_path
         journal.record_checks([WELL])
     assert journal.verify().problems == ()
     close_files()
+
+
+def test_who_is_met_while_another_thread_records_is_recorded_too():
+    meetings, recorders = Meetings(), []
+
+    class RecordedMeanwhile(list[Any]):
+        def append(self, met):
+            recorders.append(threading.Thread(target=lambda: list(meetings.record())))
+            recorders[-1].start()
+            recorders[-1].join(0.02)  # it waits, or has taken what was there before
+            super().append(met)
+
+    meetings._met = RecordedMeanwhile()
+    journal, place = memory_journal("met-meanwhile"), "epson+tcp://192.168.0.1:5000"
+    log = journal.log(place)
+    log.ask(lambda: Identity("epson:C-1/R-1", place, "epson@192.168.0.1:5000"))
+    with meetings.gathered("line3"):
+        assert log.open_markers() == ()
+    (recorder,) = recorders
+    recorder.join()
+    assert list(meetings.record()) == []
+    assert journal.addresses_of("epson:C-1/R-1") == (place,)

@@ -54,13 +54,15 @@ def places(request, tmp_path):
     return place
 
 
+SOAK = pytest.mark.soak
 KINDS = ("file", "server")
+ON_A_FILE = ("file", pytest.param("server", marks=SOAK))
 FILES, TO_SERVER, FROM_SERVER = ("file", "file"), ("file", "server"), ("server", "file")
 
 
 def later(old, new):
     """Return a way that is gone in `make soak`."""
-    return pytest.param(old, new, marks=pytest.mark.soak)
+    return pytest.param(old, new, marks=SOAK)
 
 
 def met(journal, name, address, **options):
@@ -142,7 +144,7 @@ def test_every_table_of_a_journal_is_carried_and_guarded(journal):
     assert {*seal._GUARDED, *seal._LOCKED} == known - {"schema_version"}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ON_A_FILE)
 def test_the_old_journal_is_read_and_refuses_to_be_written_by_whoever_has_it_open(
     places, kind, open_anew, tmp_path
 ):
@@ -187,7 +189,7 @@ def test_an_earlier_robolink_cannot_write_it_either(places, kind, tmp_path, serv
     store.close()
 
 
-@pytest.mark.parametrize(("old", "new"), [FROM_SERVER, FILES, later(*TO_SERVER)])
+@pytest.mark.parametrize(("old", "new"), [FILES, later(*FROM_SERVER), later(*TO_SERVER)])
 def test_one_controller_out_of_a_shared_journal_gets_a_chain_of_its_own(
     places, old, new, open_anew, state
 ):
@@ -343,7 +345,7 @@ HINDRANCES = {
 
 
 @pytest.mark.parametrize("name", HINDRANCES)
-@pytest.mark.parametrize("controller", [None, A])
+@pytest.mark.parametrize("controller", [None, pytest.param(A, marks=SOAK)])
 def test_what_hinders_a_move_is_named(tmp_path, name, controller, open_anew):
     hinder, error, words = HINDRANCES[name]
     source, target = str(tmp_path / "old.db"), str(tmp_path / "new.db")
@@ -433,18 +435,21 @@ def test_what_is_no_place_for_a_journal_is_refused(tmp_path, server):
     assert not (tmp_path / "n.db").exists()
 
 
-def test_an_empty_journal_that_was_only_opened_is_a_place(location, tmp_path, open_anew):
+@pytest.mark.parametrize("kind", ON_A_FILE)
+def test_an_empty_journal_that_was_only_opened_is_a_place(places, kind, tmp_path, open_anew):
     worked(open_anew(str(tmp_path / "old.db")))
-    opened = open_anew(location)
-    move_journal(location, source=str(tmp_path / "old.db"))
-    assert opened.count() == open_anew(location).count() > 0
+    new = places(kind, "new")
+    opened = open_anew(new)
+    move_journal(new, source=str(tmp_path / "old.db"))
+    assert opened.count() == open_anew(new).count() > 0
 
 
-def test_what_was_moved_out_before_stays_sealed_in_a_journal_that_is_moved(tmp_path, places):
+@pytest.mark.parametrize("kind", ON_A_FILE)
+def test_what_was_moved_out_before_stays_sealed_in_a_journal_that_is_moved(tmp_path, places, kind):
     shared, own = str(tmp_path / "shared.db"), str(tmp_path / "own.db")
     worked(open_journal(shared))
     move_journal(own, source=shared, controller=A)
-    whole = places("server", "")
+    whole = places(kind, "whole")
     move_journal(whole, source=shared)
     with pytest.raises(JournalError, match=f"record of {A} was moved"):
         open_journal(whole).log(A).begin(marker("x"))

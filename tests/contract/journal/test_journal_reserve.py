@@ -242,6 +242,23 @@ def test_ctrl_c_while_room_is_kept_leaves_no_transaction_open(path, open_anew, m
     assert log.open_markers() == ()
 
 
+def test_an_entry_that_was_refused_adds_nothing_to_the_journal(path, open_anew, monkeypatch):
+    """What was added since the last copy is asked of the journal, and copied."""
+    journal = open_anew(str(path))
+    journal.log("cell").append(NewEntry(EntryKind.RAW))
+    assert journal.take_grown()
+
+    def refused(_reserve, _frames):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch, pytest.raises(JournalError):
+        patch.setattr(LogReserve, "keep", refused)
+        journal.log("cell").append(NewEntry(EntryKind.RAW))
+    with journal._store.write():
+        pass  # another commit of this connection, of no entry
+    assert not journal.take_grown()
+
+
 def test_a_look_waits_for_no_other_writer(path, open_anew):
     log = open_anew(str(path)).log("cell")
     log.begin(marker("one"))

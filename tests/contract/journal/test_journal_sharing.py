@@ -1,6 +1,7 @@
 """Many processes, versions and programs on one journal, in a file or on PostgreSQL."""
 
-import multiprocessing
+import subprocess
+import sys
 import threading
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
-from robolink.journal import ChainVerification, open_journal
+from robolink.journal import ChainVerification
 from robolink.journal import this_process as here
 from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, MarkerKind, NewEntry
@@ -123,22 +124,29 @@ def _together(acts):
     assert failures == []
 
 
+WORK = """
+import sys
+from robolink.journal import open_journal
+from robolink.model import EntryKind, NewEntry
+from tests.contract.journal._acts import marker
+
+location, name = sys.argv[1:]
+log = open_journal(location).log(name)
+sys.stdin.read()  # until both may begin
+for number in range(10):
+    log.begin(marker(f"{name}{number}"))
+    log.clear(f"{name}{number}", NewEntry(EntryKind.DONE))
+"""
+
+
 def test_several_processes_share_one_journal(location, journal):
-    spawn = multiprocessing.get_context("spawn")
-    processes = [spawn.Process(target=_work, args=(location, name)) for name in ("x", "y")]
-    for process in processes:
-        process.start()
-    for process in processes:
-        process.join(timeout=30)
-    assert [process.exitcode for process in processes] == [0, 0]
+    command = (sys.executable, "-m", "tests._program", WORK, location)
+    both = [subprocess.Popen([*command, name], stdin=subprocess.PIPE) for name in ("x", "y")]
+    for process in both:
+        assert process.stdin is not None
+        process.stdin.close()
+    assert [process.wait(timeout=30) for process in both] == [0, 0]
     assert journal.verify() == ChainVerification(40, ())
-
-
-def _work(location, name):
-    log = open_journal(location).log(name)
-    for number in range(10):
-        log.begin(marker(f"{name}{number}"))
-        log.clear(f"{name}{number}", NewEntry(EntryKind.DONE))
 
 
 def _add_a_column(connection):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -12,7 +13,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli import main
-from robolink_cli.wizard.faces.link import WireLink
+from robolink_cli.wizard.faces.link import LONGEST_LINE, WireLink
 from robolink_cli.wizard.faces.wire import WireFace
 from robolink_cli.wizard.happenings import MovementHeld, WasRegarded
 from robolink_cli.wizard.screens.screen import screen_of
@@ -221,6 +222,19 @@ def test_what_no_cutting_makes_short_enough_is_not_sent_at_all():
     header = replace(Sitting().state.header, cell="c" * 70_000)
     assert b"too long" in said_by(replace(Sitting().state, remarks=("r" * 70_000,)))
     assert said_by(replace(Sitting().state, header=header)) == b""
+
+
+def test_the_end_of_a_line_that_is_too_long_is_no_press():
+    ours, theirs = socket.socketpair()
+    link = WireLink(theirs)
+    with ours, closing(link):
+        ours.sendall(b"x" * LONGEST_LINE)
+        wait_for(lambda: not select.select([theirs], [], [], 0)[0])
+        for number in (1, 2):
+            press = {"t": "press", "number": number, "action": "take", "value": ""}
+            ours.sendall(json.dumps(press).encode() + b"\n")
+        assert link.came.wait(15)
+        assert [press.number for press in link.presses()] == [2]
 
 
 def test_what_a_terminal_would_obey_is_shown_as_an_escape():

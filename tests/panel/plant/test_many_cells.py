@@ -17,6 +17,8 @@ from robolink_cli.panel.watch import STALE_AFTER_S, CellLook
 from robolink.model import Marker, MarkerKind
 
 WATCHER = Watcher()
+PAGES = Pages()
+"""It keeps nothing of a cell, and to compile its templates takes longer than to draw a page."""
 COUNT = 240
 NAMES = [f"line{number // 40 + 1}-{number % 40:02}" for number in range(COUNT)]
 GROUPS = {"line3": ("line3-*",), "first": ("line1-00", "line2-*"), "none": ("x*",)}
@@ -31,7 +33,7 @@ class NoSeats:
 @pytest.fixture
 def hub():
     cells = [PanelCell(name, "epson+tcp://192.0.2.1:5000") for name in NAMES]
-    return Hub(cells, Pages(), NoSeats(), lambda *_what, **_facts: None, GROUPS)
+    return Hub(cells, PAGES, NoSeats(), lambda *_what, **_facts: None, GROUPS)
 
 
 def seen(board, state="ready", age_s=1.0, **read):
@@ -134,7 +136,7 @@ def test_an_address_asks_for_what_there_is(hub):
 
 def test_few_cells_have_the_page_that_they_always_had():
     cells = [PanelCell("line3", "epson+tcp://192.0.2.1:5000")]
-    small = Hub(cells, Pages(), NoSeats(), lambda *_what, **_facts: None)
+    small = Hub(cells, PAGES, NoSeats(), lambda *_what, **_facts: None)
     parts = small.overview(WATCHER, NOW_S)
     assert "ways" not in parts.main
     assert "dense" not in parts.main

@@ -298,7 +298,10 @@ def test_a_decision_that_was_given_up_is_not_carried_out_later(location, store, 
 
 
 @ONLY_A_FILE
-@pytest.mark.parametrize(("decision", "step"), [("halt", "halt_of"), ("resume", "lift")])
+@pytest.mark.parametrize(
+    ("decision", "step"),
+    [("halt", "halt_of"), pytest.param("resume", "lift", marks=pytest.mark.soak)],
+)
 def test_a_decision_that_is_given_up_on_its_way_is_undone(store, page, monkeypatch, decision, step):
     plan = permitted(store, plan_with(2))
     if decision == "resume":

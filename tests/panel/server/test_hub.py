@@ -512,6 +512,20 @@ def test_each_recipe_is_offered_and_only_an_offered_one_is_taken(hub):
     assert board.subject(kind, {"recipe": "needle"}) == ""
 
 
+def test_what_a_job_tells_is_shown_at_once():
+    shown = []
+    one = PanelJob(
+        "line3",
+        KINDS["change"],
+        language="en",
+        who="",
+        changed=lambda: shown.append(list(one.told)),
+    )
+    one._heard({"t": "told", "text": "The tip was 0.2 mm off."})
+    one._heard({"t": "beat"})
+    assert shown == [["The tip was 0.2 mm off."]]
+
+
 def test_a_job_with_a_recipe_names_its_file_and_nothing_that_is_an_option():
     one = PanelJob(
         "line3", KINDS["change"], language="en", who="", changed=lambda: None, subject="-x.toml"

@@ -2,23 +2,43 @@
 
 import asyncio
 import os
+import pty
 import signal
+import socketserver
 import subprocess
 import sys
 import threading
 import time
+import tty
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, nullcontext
+from types import SimpleNamespace
 
 import pytest
-from robolink_cli.panel.stop import StopAnswer, StopAsked, StopDesk, StopEnd, StopProcess
+from robolink_cli.panel.stop import (
+    StopAnswer,
+    StopAsked,
+    StopDesk,
+    StopEnd,
+    StopProcess,
+    stop_cell,
+)
+from robolink_cli.stopping.request import StopRequest
+from robolink_cli.stopping.stop_first import stop_first
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
+from robolink.controllers import stop_now
+from robolink.controllers.epson.line import EpsonConversation, open_line
+from robolink.errors import ConnectError, LoginUnansweredError, RejectedError
 from robolink.stopping import StopListener, find_note
 from robolink.transport import far_end_of
+from tests.cli.test_stop_command import HEAVY, OF_ASYNCUA
 
 
 class Carrier:
@@ -207,10 +227,13 @@ def state_folder(tmp_path_factory):
         yield folder
 
 
+SPEED = 20
+
+
 @pytest.fixture
 def robot(state_folder):
     simulator = EpsonSimulator("T6-602S", seed=3)
-    with serve_tcp(simulator, clock=ScaledClock(20)) as host:
+    with serve_tcp(simulator, clock=ScaledClock(SPEED)) as host:
         yield simulator, host.url
 
 
@@ -296,6 +319,160 @@ def test_a_stop_does_not_wait_for_the_threads_of_the_loop(robot, own):
     assert asyncio.run(work()).outcome is StopEnd.STOPPED
 
 
+# An EPSON controller serves one client, and a look of the panel is one.
+
+
+@contextmanager
+def logged_in(url):
+    """A look that has logged in, and to which nobody can turn: it begins, or it is leaving."""
+    talk = EpsonConversation(open_line(url, timeout_s=3), timeout_s=3)
+    talk.login("")
+    try:
+        yield
+    finally:
+        talk.close()
+
+
+def stop_beside(looks, url, *, stay_s=0.15):
+    """Stop beside each look in turn, for a time each, the first of which is under way."""
+    stops, answers = threading.Event(), []
+
+    def stop():
+        stops.set()
+        answers.append((stop_cell(StopAsked(url, "mei", "en")), time.monotonic()))
+
+    thread = threading.Thread(target=stop)
+    for look in looks:
+        with look:
+            if not stops.is_set():
+                began_s = time.monotonic()
+                thread.start()
+                stops.wait()
+            time.sleep(stay_s)
+    thread.join()
+    ((answer, ended_s),) = answers
+    assert answer.outcome is StopEnd.STOPPED, answer.text
+    return ended_s - began_s
+
+
+@pytest.mark.parametrize("second", ["ignored", "closed"])
+def test_a_look_that_has_the_only_login_delays_a_stop_by_less_than_a_second(state_folder, second):
+    simulator = EpsonSimulator(seed=3, options=EpsonOptions(second_client=second))
+    with serve_tcp(simulator, clock=ScaledClock(SPEED)) as host:
+        assert stop_beside([logged_in(host.url)], host.url) < 1.0
+
+
+@pytest.mark.parametrize("second", ["ignored", "closed"])
+def test_a_look_that_stays_for_more_than_a_second_does_not_defeat_a_stop(state_folder, second):
+    simulator = EpsonSimulator(seed=3, options=EpsonOptions(second_client=second))
+    with serve_tcp(simulator, clock=ScaledClock(SPEED)) as host:
+        assert stop_beside([logged_in(host.url)], host.url, stay_s=1.2) < 2.5
+
+
+@contextmanager
+def silent_rtu():
+    ends = pty.openpty()
+    tty.setraw(ends[1])
+    yield f"softmotion+modbus-rtu://{os.ttyname(ends[1])}?parity=none"
+    for end in ends:
+        os.close(end)
+
+
+SILENT_CAN = nullcontext("softmotion+can://239.74.163.77:43777?interface=udp_multicast&node=5")
+
+
+@pytest.mark.parametrize("line", [silent_rtu, lambda: SILENT_CAN])
+def test_a_line_on_which_nobody_answers_is_tried_once(state_folder, line):
+    once = []
+    with line() as url, pytest.raises(ConnectError):
+        stop_now(url, timeout_s=0.5, trace=lambda *passage: once.append(passage))
+    with line() as url:
+        outcome = stop_first(StopRequest(named=url, timeout_s=0.5, record="kept"))
+    assert isinstance(outcome.error, ConnectError)
+    assert [way for _, way, _ in outcome.heard] == [way for _, way, _ in once] != []
+
+
+def test_for_all_attempts_the_keyring_is_asked_once(state_folder, monkeypatch):
+    asked = []
+    keyring = SimpleNamespace(get_password=lambda _service, user: asked.append(user))
+    monkeypatch.setitem(sys.modules, "keyring", keyring)
+    monkeypatch.setitem(sys.modules, "keyring.errors", SimpleNamespace(KeyringError=OSError))
+    simulator = EpsonSimulator(seed=3)
+    with serve_tcp(simulator, clock=ScaledClock(SPEED)) as host, logged_in(host.url):
+        outcome = stop_first(StopRequest(named=host.url, timeout_s=0.2))
+    assert isinstance(outcome.error, LoginUnansweredError)
+    assert len(asked) == 1
+
+
+def test_a_password_that_was_refused_is_not_tried_again(state_folder, monkeypatch):
+    """The second is not answered, as where another client has the place meanwhile."""
+    keyring = SimpleNamespace(get_password=lambda _service, _user: "canary-right")
+    monkeypatch.setitem(sys.modules, "keyring", keyring)
+    monkeypatch.setitem(sys.modules, "keyring.errors", SimpleNamespace(KeyringError=OSError))
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "canary-wrong")
+    logins = []
+
+    class Refusing(socketserver.StreamRequestHandler):
+        def handle(self):
+            for line in self.rfile:
+                logins.append(line)
+                if b"wrong" in line:
+                    self.wfile.write(b"!Login,13\r\n")
+
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Refusing) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        url = f"epson+tcp://127.0.0.1:{server.server_address[1]}"
+        outcome = stop_first(StopRequest(named=url, timeout_s=0.2))
+        server.shutdown()
+    assert isinstance(outcome.error, LoginUnansweredError)
+    assert [b"wrong" in line for line in logins] == [True, False, False, False]
+
+
+def test_who_has_the_controller_and_cannot_stop_it_is_not_asked_for_ever(robot):
+    """It comes to listen after the first attempt, which finds the place taken."""
+    _, url = robot
+    asked, outcomes = [], []
+
+    class Helpless:
+        def stop(self):
+            asked.append(time.monotonic())
+            raise RejectedError("no", remedy="", code=1)
+
+        def status(self):
+            raise AssertionError
+
+    def stop():
+        outcomes.append(stop_first(StopRequest(named=url, timeout_s=0.2)))
+
+    with logged_in(url):
+        thread = threading.Thread(target=stop)
+        thread.start()
+        time.sleep(0.25)
+        with StopListener(Helpless(), url, who="a job"):
+            thread.join()
+    assert isinstance(outcomes[0].error, RejectedError)
+    assert len(asked) == 2  # behind the first attempt, and behind the last
+
+
+def test_a_look_that_has_opened_the_line_delays_a_stop_by_less_than_a_second(state_folder):
+    with served(SoftMotionSimulator(seed=1), "modbus-rtu") as url:
+        assert stop_beside([robolink.connect(url)], url) < 1.0
+
+
+def test_a_stop_finds_a_look_that_has_begun_to_listen_meanwhile(robot):
+    _, url = robot
+
+    @contextmanager
+    def begins():
+        with robolink.connect(url) as controller:
+            yield
+            with StopListener(controller, url, who="a look"):
+                while not controller.latch.closed:
+                    time.sleep(0.002)
+
+    assert stop_beside([begins()], url) < 1.0
+
+
 LOADED = """
 import sys
 from robolink_cli.panel.stop import load_opcua
@@ -305,18 +482,19 @@ from robolink.controllers import stop_now
 stop_now(sys.argv[1])
 ours = ("asyncua", "cryptography", "robolink.transport.opcua")
 print(*sorted(name for name in set(sys.modules) - before if name.startswith(ours)))
+print(*sorted(set(sys.argv[2:]) & set(sys.modules)), sep=",")
 """
 
 
-def test_what_a_stop_over_opc_ua_takes_was_loaded_before_it():
+def test_what_a_stop_over_opc_ua_takes_was_loaded_before_it_and_is_nothing_heavy_but_asyncua():
     from robolink_simulators.hosting.fieldbus.opcua import serve_opcua
 
     with serve_opcua(SoftMotionSimulator(seed=1)) as host:
         done = subprocess.run(
-            [sys.executable, "-c", LOADED, host.url],
+            [sys.executable, "-c", LOADED, host.url, *HEAVY.split()],
             check=True,
             capture_output=True,
             text=True,
             timeout=30,
         )
-    assert done.stdout == "\n"
+    assert done.stdout == "\n" + ",".join(sorted(OF_ASYNCUA)) + "\n"

@@ -10,6 +10,7 @@ from robolink.errors import (
     LeaseLostError,
     OutcomeUnknownError,
     RejectedError,
+    RemoteProtocolError,
     TransportClosedError,
 )
 from robolink.model import MotionProfile, Path, Pose, WorkBox
@@ -57,6 +58,29 @@ def test_a_jog_whose_end_is_not_acknowledged_is_halted(cell, plc, controller):
     assert moves_nothing(plc)
     # The session goes on, and the end of the jog was read.
     assert not controller.status().running
+    assert cell.open_requests() == []
+
+
+def test_a_jog_whose_end_is_taken_and_not_seen_to_end_is_halted(cell, plc, controller):
+    """Looks are refused for a while just then; the halt is seen."""
+    acknowledge = plc.acknowledge
+
+    def refused():
+        for _ in range(3):
+            cell.link.refuse("read_head")
+
+    def begun_and_refused(command, state, error):
+        acknowledge(command, state, error)
+        if ends_a_jog(command):
+            plc.now = replace(plc.now, state=CommandState.ACTIVE)
+            cell.link.before("read_response", refused)
+
+    plc.acknowledge = begun_and_refused
+    with pytest.raises(ControllerFaultError, match=r"did not acknowledge.*was stopped") as failure:
+        jog(controller)
+    assert isinstance(failure.value.__cause__, RemoteProtocolError)
+    assert plc.opcodes() == [Opcode.JOG, Opcode.JOG, Opcode.HALT]
+    assert moves_nothing(plc)
     assert cell.open_requests() == []
 
 

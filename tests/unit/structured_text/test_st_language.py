@@ -102,12 +102,13 @@ def test_a_refusal_says_what_was_expected():
     [
         "r := 1 / r;",
         "WHILE TRUE DO r := r + 1; END_WHILE;",
+        "FOR i := 1 TO 200001 DO r := i; END_FOR;",
         "r := w[r - 1];",
         "r := TRUNC(1.0E30);",
     ],
 )
 def test_what_would_trap_is_refused_when_it_runs(body):
-    declared = "r : DINT; w : ARRAY [0..3] OF DINT;"
+    declared = "r, i : DINT; w : ARRAY [0..3] OF DINT;"
     made = program(body, declared)
     with pytest.raises(StructuredTextError, match=r"line 5"):
         made.cycle(0)

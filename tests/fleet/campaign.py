@@ -303,9 +303,10 @@ def _folder(named: Path | None) -> Iterator[Path]:
 
 @contextmanager
 def _server() -> Iterator[Server]:
-    """Serve a PostgreSQL that waits for its disk."""
+    """Serve a PostgreSQL that waits for its disk and keeps its tables in order, as a plant's."""
     with served() as server:
-        server.execute("ALTER SYSTEM SET fsync = on")
+        for setting in ("fsync", "autovacuum"):
+            server.execute(f"ALTER SYSTEM SET {setting} = on")
         server.execute("SELECT pg_reload_conf()")
         yield server
 

@@ -4,7 +4,8 @@ Each exchange with a controller has a deadline, and each question to a server, s
 nothing ends its job by itself. What has none is this computer: a disk or a network drive that does
 not answer, a lock that is not released. A job is silent when for :data:`SILENT_S` its connection
 carried nothing; signs of life that others are given beside the work (docs/reference/rules.md 6)
-keep it so for :data:`LONGEST_S` at most.
+keep it so for :data:`LONGEST_S` at most. Time in which the whole process stood still (a debugger, a
+virtual machine that was paused) does not count: its jobs could give no sign either.
 
 A thread cannot be ended. So the job is cut off instead: its controller is stopped where it may
 have written, rest is proved, and from then on nothing of it reaches the controller, whenever it
@@ -33,6 +34,9 @@ CUT_S: Final = 15.0
 
 LOOK_S: Final = 1.0
 """How often is looked for silent jobs, in s."""
+
+_STOOD_STILL_S: Final = 5.0
+"""A look that comes so late, in s, shows that this process stood still meanwhile."""
 
 _UNSETTLED: Final = 6
 """Exit code of a job whose outcome is not known."""
@@ -75,6 +79,13 @@ class _Job:
         self.outcome: JobOutcome | None = None
         self._over = False
         self._room = runtime.waiting_room()
+
+    def pass_over(self, still_s: float, now_s: float) -> None:
+        """Do not count the last ``still_s``, in which this process stood still."""
+        self.begun_s = min(self.begun_s + still_s, now_s)
+        self.seen_s = min(self.seen_s + still_s, now_s)
+        if self.cut_s is not None:
+            self.cut_s = min(self.cut_s + still_s, now_s)
 
     def cut(self, now_s: float) -> bool:
         """Note that it is cut off now; return whether it had not ended before."""
@@ -120,6 +131,7 @@ class SilentJobs:
         self._line = line
         self._lock = runtime.lock()
         self._jobs: dict[str, _Job] = {}
+        self._looked_s = _now_s()
 
     @contextmanager
     def watching(self, order: str, attempt: int, *, writes: bool) -> Iterator[_Job]:
@@ -142,7 +154,10 @@ class SilentJobs:
     def look(self) -> None:
         """Cut off what has become silent; never waits for a job."""
         now_s = _now_s()
+        late_s, self._looked_s = now_s - self._looked_s - LOOK_S, now_s
         for order, job in self._all():
+            if late_s > _STOOD_STILL_S:
+                job.pass_over(late_s, now_s)
             if job.cut_s is not None:
                 if job.outcome is None and now_s - job.cut_s > CUT_S:
                     job.settle(hanging(writes=job.writes, settled=False, at_rest=False))

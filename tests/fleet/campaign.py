@@ -180,8 +180,8 @@ def under_faults(given: argparse.Namespace, count: int, seed: int) -> dict[str, 
         if clock is not None:
             options["program"] = lambda _life: clock.program
         errs = max(given.frozen, default=0.0) >= REMOTE_TIMEOUT_S
-        if errs:  # so long a freeze also looks like a job that hangs
-            accepts += [HaltRule.REFUSALS, HaltRule.CAUSE]
+        if errs:
+            accepts.append(HaltRule.REFUSALS)
         off = round(count * given.off)
         program = ClockFile(folder, "cells-clock", days=given.cells_clock).program
         cells = dict(stack.enter_context(served_cells(folder, count - off, program=program)))

@@ -25,7 +25,7 @@ from robolink import runtime
 from robolink.fleet import FleetStore, JobOutcome, JobState, Treatment
 from robolink.fleet.agent import Agent
 from robolink.fleet.errors import PlantError
-from robolink.fleet.silence import CUT_S, LONGEST_S, SILENT_S, SilentJobs
+from robolink.fleet.silence import CUT_S, LONGEST_S, LOOK_S, SILENT_S, SilentJobs
 from robolink.journal import open_journal, signature_here
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.transaction import recover
@@ -55,6 +55,13 @@ def stepped():
         yield time_here
 
 
+def watch(silent, time_here, seconds):
+    """Look for silent jobs every second, as an agent does."""
+    for _ in range(int(seconds)):
+        time_here.go_on(LOOK_S)
+        silent.look()
+
+
 class Line:
     """Connections whose exchanges a test counts; cutting one off ends as the test says."""
 
@@ -80,18 +87,16 @@ def test_a_job_is_silent_without_an_exchange_and_no_job_is_at_work_for_ever(step
             line.sent += 1  # a sign of life that others are given, while the job itself hangs
             silent.look()
             assert not line.asked.is_set()
-            stepped.go_on(SILENT_S)
-        stepped.go_on(1)
+            watch(silent, stepped, SILENT_S)
         line.sent += 1
-        silent.look()
+        watch(silent, stepped, 1)
         assert line.asked.wait(10)
         assert {order: job.outcome for order, job in silent.cut().items()} == {"P/a": line.outcome}
     assert silent.cut() == {}
     with silent.watching("P/b", 2, writes=True):
         line.sent = 0
         line.asked.clear()
-        stepped.go_on(SILENT_S)
-        silent.look()
+        watch(silent, stepped, SILENT_S)
         assert silent.cut() == {}
         stepped.go_on(0.1)
         silent.look()
@@ -105,17 +110,52 @@ def test_where_the_stop_itself_hangs_rest_is_not_proved(writes, code, stepped):
     line = Line()
     silent = SilentJobs(line)
     with silent.watching("P/a", 1, writes=writes):
-        stepped.go_on(SILENT_S + 1)
-        silent.look()
+        watch(silent, stepped, SILENT_S + 1)
         assert line.asked.wait(10)
+        stepped.go_on(600)
         silent.look()
         assert silent.given_up() == frozenset()
-        stepped.go_on(CUT_S + 1)
-        silent.look()
+        watch(silent, stepped, CUT_S + 1)
         (job,) = silent.cut().values()
         assert job.ended(JobOutcome(0)) is job.outcome
     assert (job.attempt, job.outcome.code) == (1, code)
     assert ("press the emergency stop" in job.outcome.what) is writes
+
+
+def test_a_process_that_stood_still_holds_nothing_against_its_jobs(stepped):
+    line = Line(JobOutcome(6, "OutcomeUnknownError"))
+    silent = SilentJobs(line)
+    with silent.watching("P/a", 1, writes=True):
+        watch(silent, stepped, 10)
+        for _ in range(2):
+            stepped.go_on(2 * LONGEST_S)
+            silent.look()
+        with silent.watching("P/b", 1, writes=True):
+            stepped.go_on(60)
+            watch(silent, stepped, SILENT_S - 15)
+            assert line.cut == []
+            watch(silent, stepped, 6)
+            assert line.asked.wait(10)
+            assert line.cut == ["P/a"]
+            line.asked.clear()
+            watch(silent, stepped, 15)
+            assert line.asked.wait(10)
+    assert line.cut == ["P/a", "P/b"]
+
+
+def test_a_job_that_begins_as_the_process_goes_on_is_at_work_no_longer_than_others(stepped):
+    line = Line(JobOutcome(6, "OutcomeUnknownError"))
+    silent = SilentJobs(line)
+    stepped.go_on(10 * LONGEST_S)
+    with silent.watching("P/a", 1, writes=True):
+        silent.look()
+        for _ in range(int(LONGEST_S)):
+            assert line.cut == []
+            line.sent += 1
+            watch(silent, stepped, 1)
+        line.sent += 1
+        watch(silent, stepped, 1)
+        assert line.asked.wait(10)
 
 
 def test_no_job_comes_or_goes_while_they_are_looked_at(stepped):
@@ -155,8 +195,7 @@ def test_a_job_that_wakes_while_it_is_cut_off_ends_by_what_that_shows(own, cut, 
     line = HeldLine()
     silent = SilentJobs(line)
     with silent.watching("P/a", 1, writes=True) as job, ThreadPoolExecutor(1) as thread:
-        stepped.go_on(SILENT_S + 1)
-        silent.look()
+        watch(silent, stepped, SILENT_S + 1)
         assert line.asked.wait(10)
         ended = thread.submit(job.ended, own)
         assert not ended.done()
@@ -169,8 +208,7 @@ def test_a_job_that_has_ended_is_not_cut_off(stepped):
     silent = SilentJobs(line)
     with silent.watching("P/a", 1, writes=True) as job:
         assert job.ended(JobOutcome(0)) == JobOutcome(0)
-        stepped.go_on(SILENT_S + 1)
-        silent.look()
+        watch(silent, stepped, SILENT_S + 1)
         assert silent.cut() == {}
     assert line.cut == []
 

@@ -275,12 +275,15 @@ def test_nothing_moves_without_a_person_s_yes(cells, simulator, watched, tmp_pat
     assert entry.details["tools"]["1"][0] == 12.0
 
 
-def test_who_measures_is_asked_for_a_badge_once(cells, watched, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(("given", "role"), [("4711", "engineer"), ("", "operator")])
+def test_who_measures_is_asked_for_a_badge_once(
+    cells, watched, tmp_path, monkeypatch, capsys, given, role
+):
     badges: list[str] = []
 
     def badge(question):
         badges.append(question)
-        return "4711"
+        return given
 
     monkeypatch.setattr("robolink_cli.session.operator_identity.person_here", lambda: True)
     monkeypatch.setattr("robolink_cli.prompts.questions.asked_for_text", badge)
@@ -291,7 +294,7 @@ def test_who_measures_is_asked_for_a_badge_once(cells, watched, tmp_path, monkey
     assert "You said no." in capsys.readouterr().out
     assert len(badges) == 1
     (entry,) = recorded()
-    assert (entry.signature.operator, str(entry.signature.role)) == ("4711", "engineer")
+    assert (entry.signature.operator, str(entry.signature.role)) == (given, role)
 
 
 def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, watched, tmp_path):

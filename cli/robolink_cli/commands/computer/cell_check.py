@@ -233,7 +233,7 @@ def _measured(
     try:
         # Asked once: the answer signs what the measurement records, and the check.
         person = signature_of(context.operator, context.expected, changes=True)
-        context = context._replace(operator=person.operator or None)
+        context = context._replace(operator=person.operator)
         with open_controller(context, quiet=True, changes=True) as controller:
             reached = controller
             read: ToolState | NotReadyError

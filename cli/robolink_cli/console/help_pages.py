@@ -21,7 +21,7 @@ from robolink_cli.console.tables import columns, filled, has_wide
 _Texts = tuple[str | None, ...]
 
 _english: "WeakKeyDictionary[click.Command | click.Parameter, _Texts]" = WeakKeyDictionary()
-"""Original English texts of each click object."""
+"""Original English texts of each click object, as the catalogue has them."""
 
 
 def in_language(command: click.Command) -> click.Command:
@@ -40,9 +40,11 @@ def in_language(command: click.Command) -> click.Command:
 
 
 def _said(owner: "click.Command | click.Parameter", now: _Texts) -> list[str | None]:
-    english = _english.setdefault(owner, now)
+    english = _english.get(owner)
+    if english is None:
+        english = _english[owner] = tuple(text and _as_collected(text) for text in now)
     # click's line-keeping mark is spelled out: a catalogue has no control characters.
-    return [text and spoken(_as_collected(text)).replace("\\b\n", "\b\n") for text in english]
+    return [text and spoken(text).replace("\\b\n", "\b\n") for text in english]
 
 
 def _as_collected(text: str) -> str:

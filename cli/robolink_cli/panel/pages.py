@@ -285,6 +285,7 @@ def _words(language: str) -> Callable[..., str]:
 _translator = cache(translator)
 
 
+@cache  # compiled templates are kept in it
 def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("robolink_cli.panel"),

@@ -7,6 +7,7 @@ matrix.
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from struct import Struct
 from struct import error as struct_error
 
@@ -25,6 +26,7 @@ from robolink.model import Pose
 _SINGULAR = 1e-9
 
 _ROW = Struct("6d")
+_ANGLES = Struct("3d")
 
 _FAR = np.zeros(1, dtype=bool)
 
@@ -104,7 +106,13 @@ def _table_of_one_frame(poses: Sequence[Pose]) -> Floats | None:
 @refuses_by_name
 def rotation_of(pose: Pose) -> Floats:
     """Return the rotation of one pose."""
-    matrix: Floats = rotations(np.array([pose.coordinates()[3:]]))[0]
+    return _kept_rotation(_ANGLES.pack(pose.u_deg, pose.v_deg, pose.w_deg)).copy()
+
+
+@lru_cache(maxsize=256)  # a procedure asks for the few of its measurement many times
+def _kept_rotation(angles_deg: bytes) -> Floats:
+    """Return the rotation of packed angles: 0 and -0, which lead to 180 and -180, differ there."""
+    matrix: Floats = rotations(np.frombuffer(angles_deg).reshape(1, 3))[0]
     return matrix
 
 

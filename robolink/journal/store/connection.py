@@ -185,8 +185,8 @@ class PostgresqlConnection(DatabaseConnection):
     table_names = (
         "SELECT relname FROM pg_catalog.pg_class "
         "JOIN pg_catalog.pg_namespace ON pg_namespace.oid = pg_class.relnamespace "
-        "WHERE relkind IN ('r', 'p') AND relpersistence <> 't' "
-        "AND pg_catalog.pg_table_is_visible(pg_class.oid) AND nspname <> 'pg_catalog'"
+        "WHERE relkind IN ('r', 'p') AND relpersistence <> 't' AND nspname <> 'pg_catalog' "
+        "AND nspname = ANY (pg_catalog.current_schemas(false))"
     )
     number_type = "BIGINT"
     keyed_table = ""

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from robolink.calibration import Floats, rotation_of, rotations, select_poses, uvw_deg
+from robolink.calibration import Floats, rotation_of, select_poses, uvw_deg
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset
@@ -75,10 +75,9 @@ class OverPin:
 
     def pose(self, tilt: Tilt, above_mm: float) -> Pose:
         """Return the pose of the frame with the tip so far above the pin."""
-        turn, lean = rotations(
-            np.array([(tilt.turn_deg, 0.0, 0.0), (0.0, tilt.lean_deg, tilt.roll_deg)])
-        )
-        own = _own_rotation(self.frame)
+        turn = _rotation(tilt.turn_deg, 0.0, 0.0)
+        lean = _rotation(0.0, tilt.lean_deg, tilt.roll_deg)
+        own = _rotation(*self.frame.components()[3:])
         turned = turn @ rotation_of(self.first) @ own.T @ lean @ own
         x, y, z = (np.array(self.pin_mm) - turned @ self.tip.components()[:3]).tolist()
         u, v, w = uvw_deg(turned)
@@ -157,8 +156,8 @@ def _leaning(start: Tilt, goal: Tilt) -> Iterator[Tilt]:
         )
 
 
-def _own_rotation(frame: ToolOffset) -> Floats:
-    return rotation_of(Pose(0.0, 0.0, 0.0, *frame.components()[3:]))
+def _rotation(u_deg: float, v_deg: float, w_deg: float) -> Floats:
+    return rotation_of(Pose(0.0, 0.0, 0.0, u_deg, v_deg, w_deg))
 
 
 class TiltedNames(TouchNames):

@@ -43,7 +43,8 @@ _PIECE: Final = re.compile(
     r"\bXY\b|^\s*P\s*\W?\s*\d+\s*\W*$|/\s*(?:[RLABF]|NF|\d{1,2})\b|^\s*P\s*\d+\s*\(|=\s*\w*\s*\(|\(\s*[+-]?[\d.]|^\s*P\w{0,4}\s*\d*\s*=|^\s*P\s*$",
     re.IGNORECASE,
 )
-_SEVERAL: Final = re.compile(r"(?:[+-]?[\d.]+\s*[,;\s]\s*){2,}[+-]?[\d.]+")
+_SEVERAL: Final = re.compile(r"(?<![\d.])(?:[+-]?[\d.]+(?:\s*[,;]\s*|\s+)){2,}[+-]?[\d.]")
+"""Numbers beside each other, looked for at the first digit of a run only: some lines have many."""
 _LIKE_A_NUMBER: Final = re.compile(r"P[\dOoIlSB]+", re.ASCII)
 _HAND: Final = re.compile(r"/\s*([RL])\b", re.IGNORECASE)
 _LOCAL: Final = re.compile(r"/\s*(\d+)\b|/\s*Local\s*(\d+)", re.IGNORECASE)

@@ -31,6 +31,8 @@ _THOUSANDS: Final = {
 """Numbers with groups of three digits and a decimal part, by decimal sign. Without a decimal part a
 group and a fraction look alike, so such a text is not accepted as a number."""
 _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity|-?1\.#\w+)", re.IGNORECASE)
+_DIGIT_OR_NAN: Final = re.compile(r"[\dn]", re.IGNORECASE)
+"""In every number, and in nan and inf."""
 _COMMENT: Final = re.compile(r"\s*(#|//|!|%(?!time,)|--(?![\d.])|;)")
 _BEHIND: Final = re.compile(r"(?<=[\d.,;|\t)])\s+(?:#|//|!).*$")
 _LOOKED_AT: Final = 200
@@ -158,6 +160,8 @@ def without_trailing(rows: Sequence[list[str]]) -> int:
 def is_number(cell: str) -> bool:
     """Return whether a cell is a number, with either decimal sign, or looks like one."""
     text = plain(cell.strip())
+    if not _DIGIT_OR_NAN.search(text):
+        return False  # as most words
     if any(form.fullmatch(text) for form in _THOUSANDS.values()):
         return True
     text = text.replace(",", ".")

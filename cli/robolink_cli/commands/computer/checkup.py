@@ -23,6 +23,9 @@ from robolink_cli.console.tables import padded
 
 FoundT = TypeVar("FoundT")
 
+_OWN_FILES: Final = re.compile(r"^robolink(?:/|\.py,)", re.MULTILINE)
+"""A line of an installed package's list of files."""
+
 
 class Level(StrEnum):
     """How serious it is; only BAD keeps robolink from working."""
@@ -164,7 +167,7 @@ def check_versions() -> Iterator[Remark]:
 def check_name() -> Iterator[Remark]:
     """Look for anything else that calls itself ``robolink``."""
     own = Path(robolink.__file__).parent
-    others = sorted(set(metadata.packages_distributions().get("robolink", ())) - {"robolink"})
+    others = sorted(_packages_with_a_robolink() - {"robolink"})
     for other in others:
         yield Remark(
             "name",
@@ -185,6 +188,19 @@ def check_name() -> Iterator[Remark]:
         )
     if not others and not shadows:
         yield Remark("name", Level.OK, tr("no other package is called robolink."))
+
+
+def _packages_with_a_robolink() -> set[str]:
+    """Return the names of the installed packages that have a ``robolink`` at their top.
+
+    ``metadata.packages_distributions`` would tell, but takes every list of files apart for it.
+    """
+    return {
+        one.name
+        for one in metadata.distributions()
+        if "robolink" in (one.read_text("top_level.txt") or "").split()
+        or _OWN_FILES.search(one.read_text("RECORD") or "")
+    }
 
 
 def _homes() -> Iterator[Path]:

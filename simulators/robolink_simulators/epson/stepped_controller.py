@@ -69,12 +69,14 @@ class Companion:
             return
         self._published = (state, table)
         self._count = self._count % LAST_COUNT + 1
-        self._variables.set("robolink_begin", str(self._count))
-        for index, number in enumerate(state):
-            self._variables.set(f"robolink_state({index})", str(number))
-        for index, value in enumerate(table):
-            self._variables.set(f"robolink_tool({index})", repr(value))
-        self._variables.set("robolink_end", str(self._count))
+        self._variables.put_back(
+            {
+                "robolink_begin": (self._count,),
+                "robolink_state": state,
+                "robolink_tool": table,
+                "robolink_end": (self._count,),
+            }
+        )
 
 
 class SteppedController(RequestService, ABC):

@@ -66,7 +66,9 @@ class ScalarType:
 
     def initial(self) -> Value:
         """Return the value of a variable without an initial value."""
-        return {Family.BOOL: False, Family.REAL: 0.0}.get(self.family, 0)
+        if self.family is Family.BOOL:
+            return False
+        return 0.0 if self.family is Family.REAL else 0
 
     def wrapping(self, get: Getter) -> Getter:
         """Return a getter that keeps what another gives in range, as assignment does."""
@@ -100,6 +102,8 @@ class ArrayType:
 
     def initial(self) -> Frame:
         """Return an array as it is at first."""
+        if isinstance(self.element, ScalarType):
+            return [self.element.initial()] * self.size
         return [self.element.initial() for _ in range(self.size)]
 
 

@@ -65,10 +65,10 @@ class ExpressionTranslator:
         Raises:
             StructuredTextError: It is not in the subset.
         """
-        place = self.place(tree)
         if tree.data == "reference":
             reference = self.reference(tree)
             return Typed(reference.type, reference.get)
+        place = self.place(tree)
         if tree.data == "literal":
             (token,) = tree.children
             return self._literal(token, place)

@@ -211,7 +211,11 @@ def _converted(piece: Typed, source: ScalarType, target: ScalarType, place: Text
         return Typed(LREAL, lambda f: float(get(f)))
     if target is BOOL:
         return Typed(BOOL, lambda f: get(f) != 0)
-    return Typed(target, target.wrapping(lambda f: int(get(f))))
+    if source is BOOL:
+        return Typed(target, lambda f: int(get(f)))
+    if source.lowest >= target.lowest and source.highest <= target.highest:
+        return Typed(target, get)
+    return Typed(target, target.wrapping(get))
 
 
 def _agreed(number: float, place: TextPlace) -> int:

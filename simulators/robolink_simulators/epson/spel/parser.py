@@ -268,24 +268,31 @@ def _read(text: str) -> tuple[Statement, ...]:
     return tuple(statements)
 
 
-def parse_program_line(text: str) -> tuple[LineNode, ...]:
+def parse_program_line(text: str, *which: object) -> tuple[LineNode, ...]:
     """Return the statements in one line of a program, without its label.
+
+    What runs is known by its node, so lines with the same text need nodes of their own. The same
+    line of the same program has the same nodes, in each controller that loads it.
 
     After ``Case 1`` a statement may stand without a semicolon, as in ``Case 1 MemOn 3`` of a public
     program; no page of the reference says so.
+
+    Args:
+        text: The line.
+        which: Tells it from other lines with the same text.
 
     Raises:
         UnexpectedInput: It is not SPEL+; says where, and what could have stood there.
     """
     try:
-        return _program_line(text)
+        return _program_line(text, *which)
     except UnexpectedInput as error:
         place = error.pos_in_stream or 0
         if not _CASE_AND_VALUE.fullmatch(text, 0, place) or not _statement_word().match(
             text, place
         ):
             raise
-        return _program_line(f"{text[:place]};{text[place:]}")
+        return _program_line(f"{text[:place]};{text[place:]}", *which)
 
 
 @lru_cache(maxsize=1)
@@ -294,15 +301,15 @@ def _statement_word() -> re.Pattern[str]:
     return re.compile("|".join(one.to_regexp() for one in terminals), re.IGNORECASE)
 
 
-def _program_line(text: str) -> tuple[LineNode, ...]:
-    # What runs is known by its node, so lines with the same text have nodes of their own.
+@lru_cache(maxsize=4096)
+def _program_line(text: str, *_which: object) -> tuple[LineNode, ...]:
     nodes: tuple[LineNode, ...] = pickle.loads(_kept_line(text))
     return nodes
 
 
 @lru_cache(maxsize=4096)
 def _kept_line(text: str) -> bytes:
-    """Return a line's statements in a form to copy; a cell in each test has the same program."""
+    """Return a line's statements in a form to copy."""
     return pickle.dumps(_parser().parse(text, start="program_line"))
 
 
@@ -371,14 +378,18 @@ def label_of(line: SourceLine) -> str | None:
     return None if match is None else match[1].lower()
 
 
-def parsed(line: SourceLine) -> tuple[LineNode, ...]:
+def parsed(line: SourceLine, time: int = 0) -> tuple[LineNode, ...]:
     """Return the statements of a line that is no label.
+
+    Args:
+        line: The line.
+        time: How often the project had it before: a file may be included twice.
 
     Raises:
         ProgramFault: It is not SPEL+.
     """
     try:
-        return parse_program_line(line.text)
+        return parse_program_line(line.text, line.place, time)
     except UnexpectedToken as error:
         raise _fault(line, error, str(error.token), set(error.expected)) from error
     except UnexpectedCharacters as error:

@@ -111,6 +111,8 @@ def expanded(line: str, macros: Mapping[str, Macro]) -> str:
     if not macros:
         return line
     tokens = _TOKENS.findall(line)
+    if macros.keys().isdisjoint(map(str.lower, tokens)):
+        return line
     written, position = list[str](), 0
     while position < len(tokens):
         macro = macros.get(tokens[position].lower())

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
+from functools import lru_cache
+from operator import is_
 from typing import Any, Final, TypeVar
 
 from robolink.messages import tr
@@ -35,6 +37,12 @@ _Maker = Callable[[SpelTask], Variable]
 
 FunctionOfArray = Callable[["Emitter", Sequence[Expression], int], Operation]
 """Compiles a SPEL+ function that takes an array. Its result goes to a slot."""
+
+
+@lru_cache(maxsize=256)
+def _parts_of(kind: type[object]) -> tuple[str, ...]:
+    """Return the names of a node's parts; anything else has none."""
+    return tuple(part.name for part in fields(kind)) if is_dataclass(kind) else ()
 
 
 class Emitter:
@@ -119,7 +127,8 @@ class Emitter:
         they are made before anything else of it is read is assumed.
         """
         if isinstance(node, tuple):
-            return tuple(map(self.hoisted, node))  # type: ignore[return-value]
+            whole = tuple(map(self.hoisted, node))
+            return node if all(map(is_, whole, node)) else whole  # type: ignore[return-value]
         if isinstance(node, Name):
             if self.is_call(node):
                 return ResultSlot(self.call(node.name, node.arguments or ()))  # type: ignore[return-value]
@@ -129,13 +138,12 @@ class Emitter:
                 return ResultSlot(slot)  # type: ignore[return-value]
             if node.name in _NAMES_A_TASK or node.arguments is None:
                 return node
-        if not is_dataclass(node) or isinstance(node, type):
-            return node
-        parts = {part.name: getattr(node, part.name) for part in fields(node)}
-        new = {name: self.hoisted(part) for name, part in parts.items()}
-        if all(new[name] is parts[name] for name in parts):
-            return node
-        return replace(node, **new)
+        new = dict[str, object]()
+        for name in _parts_of(type(node)):  # type: ignore[arg-type]
+            part = getattr(node, name)
+            if (hoisted := self.hoisted(part)) is not part:
+                new[name] = hoisted
+        return replace(node, **new) if new else node  # type: ignore[type-var]
 
     def is_call(self, name: Name) -> bool:
         """Return whether a name calls a function of the project here."""

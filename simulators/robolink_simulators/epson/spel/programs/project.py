@@ -8,6 +8,7 @@ Errors that a project defines: UserErrors.dat, as RC+ writes it (docs/reference/
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -209,6 +210,7 @@ class ProjectBuilder:
         self._types = data_types(wraps=options.integer_overflow == "wrap")
         self._project = SpelProject()
         self._outlines: list[_Outline] = []
+        self._times = Counter[SourceLine]()
         self._faults: list[ProgramFault] = []
 
     def build(self, files: Iterable[Path]) -> SpelProject:
@@ -253,7 +255,8 @@ class ProjectBuilder:
     ) -> _Outline | None:
         """Take a line up; return the function that is open behind it."""
         label = label_of(line)
-        nodes: tuple[LineNode, ...] = () if label is not None else parsed(line)
+        nodes: tuple[LineNode, ...] = () if label is not None else parsed(line, self._times[line])
+        self._times[line] += 1
         if self._options.old_here == "refused" and "*" in line.text and OLD_HERE in names_in(nodes):
             raise ProgramFault(line.place, tr("P* belongs to older versions: write Here"))
         if nodes and isinstance(nodes[0], FunctionHeader):

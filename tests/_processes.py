@@ -13,6 +13,8 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator
+from contextlib import suppress
+from importlib import import_module
 from itertools import chain, compress, groupby
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any
@@ -25,6 +27,8 @@ _NUMBER = struct.Struct("H")
 """The format of a module's number in the pipe from which the processes take their work."""
 _LONGEST_KEPT_S = 0.1
 """Reports of passed tests are collected for this long, then sent together."""
+_LATE = ("asyncua", "cv2")
+"""Packages of which tests of many modules need one; each takes a quarter of a second."""
 _OF_THE_PRINTER = ("LFPlugin", "NFPlugin", "StepwisePlugin", "LogXML")
 """Plug-ins that record the whole run; the test processes do without them."""
 
@@ -51,7 +55,11 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     # Tests of faults fork, which costs less while little was run: it copies tables of all memory.
     modules.sort(key=lambda tests: "faults" not in tests[0].path.parts)
     queue = _numbers(len(modules))
-    import_all()  # once, and not in each of them
+    # Once, and not in each of them.
+    import_all()
+    for package in _LATE:
+        with suppress(ImportError):
+            import_module(package)
     session.config.get_terminal_writer().flush()
     session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
     runs = dict(_start(session, modules, queue, number) for number in range(count))

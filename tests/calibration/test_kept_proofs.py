@@ -361,6 +361,11 @@ def test_a_loop_that_converges_goes_on():
     assert correction.ratio == pytest.approx(1 / 3)
 
 
+def test_a_correction_is_the_new_offset_less_the_stored_one():
+    found = update_guard(ToolOffset(12.1, -3.2, -20.3), stored=STORED_BEFORE)
+    assert (found.dx_mm, found.dy_mm, found.dz_mm) == pytest.approx((0.1, -0.2, -0.3))
+
+
 def test_growth_within_the_noise_is_no_divergence():
     update_guard(ToolOffset(12.03, -3, -20), stored=STORED_BEFORE, earlier_mm=[0.01])
     with refused("diverging"):

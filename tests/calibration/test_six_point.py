@@ -137,6 +137,18 @@ def test_angles_are_read_off_a_matrix_and_lead_back_to_it(angles):
     assert rotation_of(Pose(0, 0, 0, *uvw_deg(matrix))) == pytest.approx(matrix, abs=1e-9)
 
 
+def test_who_changes_a_rotation_changes_no_other_and_each_is_that_of_its_own_angles():
+    changed = rotation_of(Pose(0, 0, 0, 10, 20, 30))
+    changed[0, 0] = 7.0
+    again = rotation_of(Pose(5, 6, 7, 10, 20, 30))
+    assert again == pytest.approx(
+        Rotation.from_euler("ZYX", [10, 20, 30], degrees=True).as_matrix()
+    )
+    # Where the arm hangs, 0 and -0 lead to 180 and -180.
+    for zero in (0.0, -0.0):
+        assert math.copysign(1.0, rotation_of(Pose(0, 0, 0, zero))[1, 0]) == math.copysign(1, zero)
+
+
 @pytest.mark.parametrize("angles", [*CASES, (25, 0, 180), (-40, 180, 0)])
 def test_codesys_angles_are_the_same_matrix(angles):
     matrix = rotation(*angles)

@@ -46,12 +46,12 @@ def test_a_controller_that_keeps_its_promises_is_only_looked_at(run, simulator):
 
 def test_what_the_checks_ask_is_recorded(run, simulator, tmp_path):
     told = ("--record", str(tmp_path / "dialogue.jsonl"))
-    assert run("check-contract", *told)[0] == 0
-    reading = (tmp_path / "dialogue.jsonl").read_text(encoding="ascii")
-    assert reading.count("$GetStatus") > 2
+    assert run("tool", "get", "1", *told)[0] == 0
+    before = (tmp_path / "dialogue.jsonl").read_text(encoding="ascii")
     assert run("check-contract", "--write", "--tool", "2", "--yes", *told)[0] == 0
     whole = (tmp_path / "dialogue.jsonl").read_text(encoding="ascii")
-    assert whole.startswith(reading)
+    assert whole.startswith(before)
+    assert whole.count("$GetStatus") > before.count("$GetStatus") + 2
     assert whole.count("TLSet 2, XY") >= simulator.counters()["tool_writes"] // 2
 
 

@@ -94,6 +94,19 @@ class Signals:
             signal.raise_signal(self.number)
 
 
+COUNTED: dict[tuple[str, ...], Signals] = {}
+
+
+def counted(cell, *told):
+    """Return the points that a whole run passes, which are the same at each cell of a kind."""
+    key = (cell.fixture.url.partition(":")[0], *told)
+    if key not in COUNTED:
+        with observed(counting := Signals()):
+            assert cell.run(*told)[0] == 0
+        COUNTED[key] = counting
+    return COUNTED[key]
+
+
 def ended(cell, number, at, *told):
     with observed(Signals(number, at=at)):
         return cell.run(*told)
@@ -102,15 +115,13 @@ def ended(cell, number, at, *told):
 @pytest.mark.parametrize(
     "every",
     [
-        pytest.param(1009, id="few"),
+        pytest.param(1511, id="few"),
         pytest.param(311, id="sample", marks=pytest.mark.soak),
         pytest.param(7, id="each", marks=pytest.mark.soak),
     ],
 )
 def test_a_signal_at_any_moment_leaves_all_as_it_was_and_says_so(cell, every):
-    with observed(counting := Signals()):
-        assert cell.run(*ALL)[0] == 0
-    for turn, at in enumerate(range(60, counting.passed, every)):
+    for turn, at in enumerate(range(60, counted(cell, *ALL).passed, every)):
         number = list(CODES)[turn % 2]
         cell.report.write_text("of before")
         code, out, err = ended(cell, number, at, *ALL, "--json")
@@ -128,26 +139,23 @@ def test_a_signal_at_any_moment_leaves_all_as_it_was_and_says_so(cell, every):
 
 
 def test_what_moved_before_is_not_denied(epson):
-    with observed(counting := Signals()):
-        assert epson.run("--move", "--yes")[0] == 0
+    logins = counted(epson, "--move", "--yes").logins
     # The login of the last check: no connection has moved anything yet.
-    _, _, err = ended(epson, signal.SIGINT, counting.logins[-3], "--move", "--yes")
+    _, _, err = ended(epson, signal.SIGINT, logins[-3], "--move", "--yes")
     assert "\n  Every movement has ended. Nothing was written." in err
 
 
 def test_a_signal_while_it_is_put_back_waits_for_that(epson):
-    with observed(counting := Signals()):
-        assert epson.run(*ALL)[0] == 0
-    code, _, err = ended(epson, signal.SIGTERM, counting.logins[-1], *ALL)
+    logins = counted(epson, *ALL).logins
+    code, _, err = ended(epson, signal.SIGTERM, logins[-1], *ALL)
     assert (code, epson.open_markers()) == (143, ())
     assert f"{len(EVERY)} of {len(EVERY)} checks were made" in err
     assert epson.cases()[-1] == ("what_was_there_is_put_back", "error")
 
 
 def test_a_reader_reads_what_was_found_before_it_was_ended(epson):
-    with observed(counting := Signals()):
-        assert epson.run()[0] == 0
-    code, out, err = ended(epson, signal.SIGINT, counting.logins[-1], "--lang", "en")
+    logins = counted(epson).logins
+    code, out, err = ended(epson, signal.SIGINT, logins[-1], "--lang", "en")
     assert (code, out) == (130, "")
     assert "7 of 8 checks were made, 0 failed." in err
     assert epson.cases()[-2:] == [

@@ -1,8 +1,5 @@
 """The frame of the command line: the modules that it loads, and how it merges options."""
 
-import os
-import subprocess
-import sys
 from typing import Any
 
 import click
@@ -13,13 +10,12 @@ from robolink_cli.command_map import SECTIONS
 from robolink_cli.commands.groups import cell, expert, robot
 from robolink_cli.console.render import json_is_on, note
 from robolink_cli.session.connection import open_controller
-from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason
 from robolink.model import ControllerStatus, Ledger, Marker, MarkerKind
 from robolink.stop_latch import StopLatch
+from tests.cli._fresh_python import shown_and_loaded
 
 URL = "epson+tcp://192.0.2.1:5000"
 OTHER = "epson+tcp://192.0.2.2:5000"
@@ -47,52 +43,15 @@ HEAVY = {
 }
 
 
-@pytest.mark.parametrize(
-    ("arguments", "environment"),
-    [
-        (["--help"], {}),
-        (["cell", "--help"], {}),
-        (["--version"], {}),
-        ([], {"_ROBOLINK_COMPLETE": "bash_complete", "COMP_WORDS": "robolink ", "COMP_CWORD": "1"}),
-    ],
-    ids=["help", "group", "version", "tab"],
-)
-def test_looking_at_the_commands_loads_none_of_the_heavy_packages(arguments, environment):
-    program = (
-        "import sys, atexit\n"
-        f"atexit.register(lambda: print('loaded:', sorted({HEAVY!r} & set(sys.modules))))\n"
-        "from robolink_cli.main import main\n"
-        "main()\n"
-    )
-    # The parent's import path reaches the child whichever way the project is installed.
-    paths = os.pathsep.join(path for path in sys.path if path)
-    done = subprocess.run(
-        [sys.executable, "-S", "-c", program, *arguments],
-        env={**os.environ, **environment, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == "loaded: []"
-    expected = {"--version": "0.1.0", "cell": "doctor"}.get(" ".join(arguments[:1]), "calibrate")
-    assert expected in done.stdout
+TAB = {"_ROBOLINK_COMPLETE": "bash_complete", "COMP_WORDS": "robolink ", "COMP_CWORD": "1"}
 
 
-def test_a_tool_is_read_without_an_eye(state_folder):
-    with serve_tcp(EpsonSimulator(seed=4)) as host:
-        program = (
-            "import sys\n"
-            "from robolink_cli.main import run\n"
-            f"code = run(['-c', {host.url!r}, 'tool', 'get', '1'])\n"
-            "eyes = {'PIL', 'cv2', 'robolink.eye', 'robolink.eye.picture'} & set(sys.modules)\n"
-            "print('loaded:', sorted(eyes), code)\n"
-        )
-        done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
-        )
-    assert done.stdout.splitlines()[-1] == "loaded: [] 0", done.stdout + done.stderr
+def test_looking_at_the_commands_loads_none_of_the_heavy_packages():
+    lines = [(["--help"], {}), (["cell", "--help"], {}), (["--version"], {}), ([], TAB)]
+    shown = shown_and_loaded(lines, HEAVY)
+    assert [one[-1] for one in shown] == ["ended: 0 []"] * 4
+    for one, expected in zip(shown, ("calibrate", "doctor", "0.1.0", "calibrate"), strict=True):
+        assert expected in "\n".join(one)
 
 
 def test_every_command_of_the_first_page_is_listed_with_its_line():

@@ -18,6 +18,7 @@ from robolink_cli.commands.groups import config
 
 from robolink.journal import open_log
 from robolink.model import EntryKind, NewEntry, Signature
+from tests.cli._fresh_python import shown_and_loaded
 
 # completion: the scripts, and the words that TAB offers.
 
@@ -71,51 +72,24 @@ def test_a_click_without_that_shell_says_what_to_install(monkeypatch, capsys):
     assert "click 8.5" in capsys.readouterr().err
 
 
-OFFERED = {
-    ("robolink", "expert", "comp"): {"completion"},
-    ("robolink", "-c", ""): {"line3", "a"},
-    ("robolink", "status", "-c", "li"): {"line3"},
-    ("robolink", "cell", "sh"): {"show"},
-}
-
-
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash on this machine")
-def test_tab_in_bash_offers_what_fits(shell_environment):
-    lines = ['eval "$(robolink expert completion bash)"']
-    for words in OFFERED:
-        quoted = " ".join(f"'{word}'" for word in words)
-        lines += [
-            f"COMPREPLY=(); COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}",
-            "_robolink_completion robolink",
-            'echo "${COMPREPLY[@]}"',
-        ]
-    done = subprocess.run(
-        ["bash", "-c", "\n".join(lines)],
-        env=shell_environment,
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=True,
-    )
-    assert done.stderr == ""
-    for (words, expected), line in zip(OFFERED.items(), done.stdout.splitlines(), strict=True):
-        assert expected <= set(line.split())
-        assert all(word.startswith(words[-1]) for word in line.split()), (words, line)
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash on this machine")
-def test_a_name_with_blanks_and_signs_is_one_word_in_bash(shell_environment):
+def test_tab_in_bash_offers_what_fits_and_a_name_with_blanks_and_signs_is_one_word(
+    shell_environment,
+):
     names = ("PIN 07", "it's", "P*", "$HOME", "\u9488")
-    cells = shell_environment["ROBOLINK_CONFIG"]
-    with open(cells, "a", encoding="utf-8") as file:
+    with open(shell_environment["ROBOLINK_CONFIG"], "a", encoding="utf-8") as file:
         for name in names:
             file.write(f'[cells.line3.stations."{name}"]\nkind = "pin"\n')
-    script = (
-        'eval "$(robolink expert completion bash)"; cd /\n'
-        "COMP_WORDS=(robolink -c line3 cell station show ''); COMP_CWORD=6\n"
-        "_robolink_completion robolink\n"
-        'for one in "${COMPREPLY[@]}"; do eval "set -- $one"; printf "%s|%s\\n" "$#" "$1"; done\n'
-    )
+    script = """
+        eval "$(robolink expert completion bash)"; cd /
+        press() {
+            COMPREPLY=(); COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _robolink_completion robolink
+        }
+        press robolink expert comp; echo "${COMPREPLY[@]}"
+        press robolink status -c li; echo "${COMPREPLY[@]}"
+        press robolink -c line3 cell station show ''
+        for one in "${COMPREPLY[@]}"; do eval "set -- $one"; printf "%s|%s\\n" "$#" "$1"; done
+    """
     done = subprocess.run(
         ["bash", "-c", script],
         env={**shell_environment, "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"},
@@ -125,6 +99,8 @@ def test_a_name_with_blanks_and_signs_is_one_word_in_bash(shell_environment):
         timeout=30,
         check=True,
     )
+    assert done.stderr == ""
+    assert done.stdout.splitlines()[:2] == ["completion", "line3"]
     assert {f"1|{name}" for name in names} <= set(done.stdout.splitlines()), done.stdout
 
 
@@ -158,6 +134,7 @@ def offered_by_tab(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
+        (["cell", "sh"], ["show"]),
         (["-c", "line3", "tool", "get", ""], ["3", "12"]),
         (["tool", "get", "-c", "line3", "1"], ["12"]),
         (["-c", OTHER, "calibrate", "n-angle", "--tool", ""], ["7"]),
@@ -188,36 +165,18 @@ def test_tab_goes_on_without_a_journal(offered_by_tab, tmp_path, damage):
     assert len(offered_by_tab("-c", "line3", "tool", "get", "")) == 15
 
 
-def test_tab_on_a_station_loads_nothing_heavy(shell_environment):
-    line = "robolink -c line3 cell station show "
-    assert _loaded_by_tab(shell_environment, line, 6) == ["plain,PIN-07", "loaded: []"]
-
-
-def test_tab_on_a_cell_reads_the_files_and_nothing_heavy(shell_environment):
-    assert _loaded_by_tab(shell_environment, "robolink -c ", 2) == [
-        *("plain,line3", "plain,a", "loaded: []")
+def test_tab_reads_the_files_and_loads_nothing_heavy(shell_environment):
+    heavy = {"pydantic", "rich", "serial", "keyring", "lark", "robolink.controllers"}
+    heavy |= {"numpy", "pymodbus", "can", "canopen"}
+    lines: list[tuple[list[str], dict[str, str]]] = [
+        ([], {"COMP_WORDS": "robolink -c line3 cell station show ", "COMP_CWORD": "6"}),
+        ([], {"COMP_WORDS": "robolink -c ", "COMP_CWORD": "2"}),
     ]
-
-
-def _loaded_by_tab(shell_environment, line, word):
-    program = (
-        "import atexit, sys\n"
-        "heavy = {'pydantic', 'rich', 'serial', 'keyring', 'lark', 'robolink.controllers', "
-        "'numpy', 'pymodbus', 'can', 'canopen'}\n"
-        "atexit.register(lambda: print('loaded:', sorted(heavy & set(sys.modules))))\n"
-        "from robolink_cli.main import main\n"
-        "main()\n"
-    )
-    tab = {"_ROBOLINK_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(word)}
-    done = subprocess.run(
-        [sys.executable, "-S", "-c", program],
-        env=shell_environment | tab,
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=True,
-    )
-    return done.stdout.splitlines()
+    everywhere = shell_environment | {"_ROBOLINK_COMPLETE": "bash_complete"}
+    assert shown_and_loaded(lines, heavy, **everywhere) == [
+        ["plain,PIN-07", "ended: 0 []"],
+        ["plain,line3", "plain,a", "ended: 0 []"],
+    ]
 
 
 # The map of commands: the first page, the groups, and the old names, which still work.

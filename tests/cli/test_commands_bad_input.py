@@ -74,8 +74,19 @@ STATES = {
 }
 
 
-@pytest.mark.parametrize("command", [SET, CLEAR, SELECT, JOG, CALIBRATE, MOTORS], ids=" ".join)
-@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize(
+    ("state", "command"),
+    [
+        pytest.param(
+            state,
+            command,
+            id=f"{state}-{' '.join(command)}",
+            marks=pytest.mark.soak if row != column else (),
+        )
+        for row, state in enumerate(STATES)
+        for column, command in enumerate([SET, CLEAR, SELECT, JOG, CALIBRATE, MOTORS])
+    ],
+)
 def test_a_state_that_forbids_it_is_named_and_nothing_is_sent(cell, state, command):
     act, reason, words = STATES[state]
     panel = cell.simulator.panel
@@ -374,7 +385,7 @@ def check_motion_is_blocked_until_recovered(cell):
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
-    "every", [pytest.param(3, id="sample"), pytest.param(1, id="each", marks=pytest.mark.soak)]
+    "every", [pytest.param(5, id="sample"), pytest.param(1, id="each", marks=pytest.mark.soak)]
 )
 def test_cable_gone_during_a_move_is_unknown_is_not_resent_and_is_settled_by_recover(
     tmp_path, monkeypatch, every

@@ -40,8 +40,19 @@ def evil(simulator):
     return simulator
 
 
-@pytest.mark.parametrize("command", OF_CONTROLLERS, ids=" ".join)
-@pytest.mark.parametrize("fault", [False, True])
+@pytest.mark.parametrize(
+    ("command", "fault"),
+    [
+        pytest.param(
+            command,
+            fault,
+            id=f"{' '.join(command)}-{fault}",
+            marks=pytest.mark.soak if (row + column) % 2 else (),
+        )
+        for row, command in enumerate(OF_CONTROLLERS)
+        for column, fault in enumerate([True, False])
+    ],
+)
 def test_no_word_of_a_controller_is_obeyed(run, evil, command, fault):
     if fault:
         evil.panel.raise_error(4002)

@@ -152,10 +152,20 @@ def test_a_requirement_with_another_condition_is_a_defect():
         requirement("colorama>=1; sys_platform == 'win32'")
 
 
-def test_another_package_that_brings_a_robolink_is_bad(monkeypatch):
-    monkeypatch.setattr(
-        metadata, "packages_distributions", lambda: {"robolink": ["robolink", "robodk"]}
-    )
+@pytest.mark.parametrize(
+    ("listed", "content"),
+    [
+        ("top_level.txt", "robodk\nrobolink\n"),
+        ("RECORD", "robodk/__init__.py,,\nrobolink/__init__.py,sha256=x,1\n"),
+        ("RECORD", "robolink.py,,\n"),
+    ],
+)
+def test_another_package_that_brings_a_robolink_is_bad(monkeypatch, tmp_path, listed, content):
+    info = tmp_path / "robodk-5.6.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: robodk\nVersion: 5.6\n")
+    (info / listed).write_text(content)
+    monkeypatch.syspath_prepend(tmp_path)
     (remark,) = check_name()
     assert remark.level is Level.BAD
     assert "robodk" in remark.what
@@ -164,7 +174,6 @@ def test_another_package_that_brings_a_robolink_is_bad(monkeypatch):
 
 @pytest.mark.parametrize("name", ["robolink.py", "robolink/__init__.py"])
 def test_another_robolink_on_the_import_path_is_named(monkeypatch, tmp_path, name):
-    monkeypatch.setattr(metadata, "packages_distributions", dict)
     (tmp_path / name).parent.mkdir(exist_ok=True)
     (tmp_path / name).touch()
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
@@ -270,7 +279,7 @@ def fails(*_arguments, **_options):
 
 BROKEN = {
     "serial": "serial.tools.list_ports.comports",
-    "name": "importlib.metadata.packages_distributions",
+    "name": "importlib.metadata.distributions",
     "python": "importlib.metadata.distribution",
     "click": "importlib.metadata.version",
     "state": "os.access",
@@ -299,7 +308,7 @@ def test_a_look_that_breaks_off_is_one_line_and_the_others_go_on(capsys, monkeyp
 
 def test_what_is_wrong_stands_first(capsys, monkeypatch):
     install(monkeypatch, {"robolink": "0.1.0", "click": "9.5"}, ["click<9,>=8.1"])
-    monkeypatch.setattr("importlib.metadata.packages_distributions", fails)
+    monkeypatch.setattr("importlib.metadata.distributions", fails)
     assert main.run(["doctor"]) == 1
     lines = [line.split()[0] for line in capsys.readouterr().out.splitlines()[:-1]]
     levels = [word for word in lines if word in ("bad", "warn", "ok")]

@@ -147,7 +147,7 @@ def test_a_table_fits_every_terminal(name, language, monkeypatch):
     TABLES[name]()
     assert found
     for title, heads, rows, _ in found:
-        for width in WIDTHS:
+        for width in {60, *WIDTHS[(language == "zh") :: 2]}:
             check_fits(drawn(title, heads, rows, width), heads, rows, width)
 
 
@@ -164,7 +164,7 @@ def test_a_table_of_any_shape_fits(count):
     for shift in range(len(SENTENCES)):
         cells = [SENTENCES[(n + shift) % len(SENTENCES)] for n in range(count)]
         heads = [f"column {n}" for n in range(count)]
-        for width in WIDTHS:
+        for width in WIDTHS[shift % 2 :: 2]:
             check_fits(drawn("title", heads, [cells, cells], width), heads, [cells], width)
 
 
@@ -198,7 +198,7 @@ def test_every_table_is_drawn_in_one_place():
 @pytest.mark.parametrize("name", SCREENS)
 def test_the_dialogue_of_lines_fits_every_terminal(name, language):
     state = SCREENS[name]().state
-    for width in WIDTHS:
+    for width in {60, *WIDTHS[(language == "zh") :: 2]}:
         lines = "\n".join([*told_before(state, width), told_question(state)]).split("\n")
         for line in lines:
             # Columns would be torn apart; sentences are wrapped.

@@ -80,7 +80,7 @@ def test_the_document_has_each_candidate_with_its_reasons(robolink, tip_picture,
 
 def test_the_best_few_are_listed_and_all_where_they_are_asked_for(robolink, tmp_path):
     """Without a radius every size is looked for, and most of what is found is refused."""
-    (tmp_path / "screws.png").write_bytes(png_of(drawing(24, SIZE_PX).grey))
+    (tmp_path / "screws.png").write_bytes(png_of(drawing(24, (160, 120)).grey))
     words = ("eye", "look", "--picture", str(tmp_path / "screws.png"))
     everything = json.loads(robolink(*words, "--json")[1])["candidates"]
     accepted = sum(not one["refused"] for one in everything)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import sqlite3
 import subprocess
 import sys
@@ -10,6 +11,8 @@ import pytest
 from robolink_cli import main
 from robolink_cli.commands.record.journal_export import COLUMNS
 from robolink_cli.views.journal import detail_rows
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.model import EntryKind, NewEntry, Signature
 from tests.cli._recorded_changes import (
@@ -283,18 +286,37 @@ def test_a_newer_journal_is_exported_but_not_verified(run, document, recorded, s
     assert (code, "newer robolink" in err) == (2, True)
 
 
-def test_looking_at_the_journal_loads_no_driver_and_at_the_cells_no_mathematics(recorded):
-    code = (
-        "import sys; from robolink_cli import main; main.run(['journal', 'list']);"
-        "heavy = ('numpy', 'pymodbus', 'can', 'serial');"
-        "loaded = lambda names: [m for m in sys.modules if m.startswith(names)];"
-        "journal = loaded(('robolink.controllers', *heavy));"
-        "main.run(['cell', 'list']); main.run(['cell', 'files']); print(journal + loaded(heavy))"
-    )
-    shown = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
-    )
-    assert shown.stdout.splitlines()[-1] == "[]"
+LOOKS = """
+import sys
+from robolink_cli import main
+def loaded(*names):
+    print("loaded:", [name for name in sys.modules if name.startswith(names)])
+main.run(["journal", "list"])
+loaded("robolink.controllers", "numpy", "pymodbus", "can", "serial")
+main.run(["cell", "list"])
+main.run(["cell", "files"])
+loaded("numpy", "pymodbus", "can", "serial")
+main.run(["-c", sys.argv[1], "tool", "get", "1"])
+loaded("numpy", "PIL", "cv2", "robolink.eye")
+import robolink.calibration, robolink_cli.views.documents
+import robolink_cli.commands.measure.calibrate
+loaded("numpy")
+"""
+
+
+def test_looking_at_journal_cells_and_tools_loads_no_driver_eye_or_mathematics(recorded):
+    with serve_tcp(EpsonSimulator(seed=4)) as host:
+        shown = subprocess.run(
+            [sys.executable, "-c", LOOKS, host.url],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=60,
+        )
+    found = [line for line in shown.stdout.splitlines() if line.startswith("loaded:")]
+    assert found == ["loaded: []"] * 4
+    assert "12.000" in shown.stdout  # the tool was read
 
 
 # journal export: CSV for a spreadsheet, JSON and JSON lines for programs.

@@ -69,8 +69,19 @@ SAID = (
 )
 
 
-@pytest.mark.parametrize("command", ["recover", "resolve"])
-@pytest.mark.parametrize("kind", REFUSED, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize(
+    ("kind", "command"),
+    [
+        pytest.param(
+            kind,
+            command,
+            id=f"{kind.__name__}-{command}",
+            marks=pytest.mark.soak if (row + column) % 2 else (),
+        )
+        for row, kind in enumerate(REFUSED)
+        for column, command in enumerate(["recover", "resolve"])
+    ],
+)
 def test_recover_refused_never_proposes_recover_alone(kind, command, monkeypatch, capsys):
     texts = iter(SAID)
 

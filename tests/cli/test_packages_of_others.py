@@ -103,6 +103,10 @@ BREAKS = "raise ImportError('no such thing in this version')"
 CELL = '[cells.a]\nurl = "epson+tcp://192.0.2.1:5000"\n'
 
 
+def soak(name):
+    return pytest.param(name, marks=pytest.mark.soak)
+
+
 @pytest.fixture
 def instead(tmp_path):
     """Run a command with another version of a package first in the path."""
@@ -129,9 +133,7 @@ def instead(tmp_path):
     return run
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param("click", marks=pytest.mark.soak), "pydantic", "rich"]
-)
+@pytest.mark.parametrize("name", [soak("click"), soak("pydantic"), "rich"])
 def test_doctor_names_what_is_there_and_what_is_needed(instead, name):
     done = instead(name, "1.0.3", BREAKS, "doctor")
     assert done.returncode == 1, done.stderr
@@ -152,7 +154,7 @@ def test_doctor_without_click_speaks_json_too(instead):
     assert (first["subject"], first["level"]) == ("click", "bad")
 
 
-@pytest.mark.parametrize("name", ["click", "pydantic"])
+@pytest.mark.parametrize("name", [soak("click"), "pydantic"])
 def test_a_command_that_such_a_package_breaks_is_no_defect(instead, name):
     done = instead(name, "1.0.3", BREAKS, "cell", "list", "--json")
     assert done.returncode == 2, done.stdout

@@ -426,9 +426,13 @@ def test_who_stands_there_is_said_in_the_document(capsys):
 def test_in_simulated_time_each_exchange_takes_the_answer_time(capsys, answer_ms):
     assert main.run(["demo", "--json", "--speed", "0", "--answer-ms", str(answer_ms)]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["answer_ms"] == answer_ms
+    assert (document["schema"], document["answer_ms"]) == ("robolink/demo/2", answer_ms)
+    assert [one["kind"] for one in document["controllers"]] == ["epson", "softmotion"]
+    assert document["controllers"][1]["exchanges"] <= 700
     for one in document["controllers"]:
+        assert {"recovered", "truth", "drift_mm"} <= set(one)
         assert one["error_mm"] < 0.05
+        assert one["exchanges"] > 100
         # While the robot moves, answers to the looks at it take no time of their own.
         assert one["simulated_s"] > max(10, one["exchanges"] * answer_ms / 1000)
 

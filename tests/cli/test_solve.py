@@ -1,9 +1,6 @@
 """solve: offline, from a file; every refusal is named, every slip has its path."""
 
 import json
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -538,24 +535,6 @@ def test_no_method_is_left_untried():
     touching = {"touch_evidence", "verify_evidence"}
     lasting = {"length_change", "station_shift", "needle_chain", "station_chain"}
     assert set(METHODS) == set(MORE) | shared | here | touching | lasting
-
-
-def test_looking_at_a_controller_does_not_load_numpy():
-    program = (
-        "import sys; import robolink.calibration, robolink_cli.views.documents\n"
-        "import robolink_cli.commands.measure.calibrate\n"
-        "print('numpy' in sys.modules)\n"
-    )
-    paths = os.pathsep.join(path for path in sys.path if path)
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-    )
-    assert done.stdout == "False\n", done.stderr
 
 
 def test_touches_without_an_arrival_were_seen_by_nobody(solved):

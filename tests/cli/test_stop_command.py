@@ -440,7 +440,7 @@ kind = "pin"
 """
 
 
-@pytest.mark.parametrize("more", ["", "robot = 'T6-602S'", "timeout_s = 2.5", WHOLE])
+@pytest.mark.parametrize("more", ["", "timeout_s = 2.5", WHOLE])
 def test_a_cell_file_is_checked_anew_for_a_look_when_it_changed(moving, stop, capsys, more):
     assert stop()[0] == 0
     cell = Path("robolink.toml")

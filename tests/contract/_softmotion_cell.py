@@ -27,18 +27,6 @@ LINKS: Final = [
 """The links that every test of links uses. The bus within one process is left to ``make soak``: the
 bus between processes demands more.
 """
-LINKS_BUT_OPCUA: Final = [
-    pytest.param(name, marks=pytest.mark.soak if name in ("can-virtual", "opcua") else ())
-    for name in BACKENDS
-]
-"""The same, with OPC UA left to ``make soak`` too, since its server takes the most CPU: for tests
-whose promise other tests hold over OPC UA.
-"""
-FEW_LINKS: Final = [
-    pytest.param(name, marks=() if name in ("sim", "modbus-tcp") else pytest.mark.soak)
-    for name in BACKENDS
-]
-"""The links of tests about what lies above the link; they use the others only in ``make soak``."""
 OWNER_SILENCE_S: Final = 10.1
 """A mailbox is free after its owner has been silent for this long.
 
@@ -169,6 +157,15 @@ def _free_port() -> int:
 def on_links(value: object, links: Iterable[Any]) -> list[Any]:
     """Return a parameter with each of some links, which keep their marks."""
     return [pytest.param(value, *link.values, marks=link.marks) for link in links]
+
+
+def few_links(*others: str) -> list[Any]:
+    """Return the links of a test about what lies above the link; the rest is ``make soak``'s.
+
+    In process, and over ``others``, which such tests take in turn.
+    """
+    used = ("sim", *others)
+    return [pytest.param(name, marks=() if name in used else pytest.mark.soak) for name in BACKENDS]
 
 
 def above(pose: Pose, by_mm: float) -> Pose:

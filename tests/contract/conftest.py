@@ -1,6 +1,7 @@
 """The backend matrix: the same checks on the in-process simulator, on a socket, on hardware."""
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -42,16 +43,24 @@ def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Deselect what a serial line has no frame for, and leave most of the rest to soak."""
+    """Deselect what a serial line has no frame for, and leave most of what is served to soak.
+
+    What a driver makes of an answer is the same on every link. In ``make test`` a test meets a
+    socket or a serial line only if it is marked so, or is not run in process.
+    """
+    asked = {item.nodeid for item in items if not item.get_closest_marker("soak")}
     impossible = []
     for item in items:
         given = getattr(item, "callspec", None)
-        if given is None or "pty" not in (given.params.get("cell"), given.params.get("serve")):
+        link = given and (given.params.get("cell") or given.params.get("serve"))
+        if link not in ("tcp", "pty"):
             continue
-        if item.get_closest_marker("remote_ethernet") or not PSEUDO_TERMINALS:
+        if link == "pty" and (item.get_closest_marker("remote_ethernet") or not PSEUDO_TERMINALS):
             impossible.append(item)
-        elif not item.get_closest_marker("on_serial"):
-            item.add_marker(pytest.mark.soak)
+        elif not item.get_closest_marker("on_every_link"):
+            in_process = re.sub(rf"\b{link}\b", "sim", item.nodeid)
+            if link == "pty" or in_process in asked:
+                item.add_marker(pytest.mark.soak)
     if impossible:
         config.hook.pytest_deselected(items=impossible)
         items[:] = [item for item in items if item not in impossible]

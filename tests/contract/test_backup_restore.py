@@ -72,6 +72,7 @@ def test_taking_one_writes_nothing(serve, simulator):
     assert simulator.machine.flash_writes == written
 
 
+@pytest.mark.on_every_link
 def test_a_restore_brings_everything_back_with_one_write_a_tool(serve, simulator):
     with serve(simulator) as cell, cell.connect() as controller:
         backup = take_backup(controller)

@@ -99,7 +99,7 @@ def test_a_camera_is_found_and_then_sees_the_next_nozzle(desk, kind):
         assert len(seen["fit"]["residuals_mm"]) == 4
 
 
-def test_a_spot_that_stands_still_ends_with_7_and_in_the_proof_with_8(desk):
+def test_a_spot_that_stands_still_and_a_camera_that_changed_are_refused(desk):
     opened = desk()
     usual = ("--tool", "1", "--station", "CAM", "--sensor", SIM, "--yes", "--json")
     assert opened.run("calibrate", "camera-affine", "--at", opened.at, *usual)[0] == 0
@@ -113,6 +113,14 @@ def test_a_spot_that_stands_still_ends_with_7_and_in_the_proof_with_8(desk):
         assert document["error"]["code"] == "tip_did_not_move"
         assert "Clean window and tip" in document["error"]["remedy"]
         assert opened.cell.stored.rounded(3) == stored.rounded(3)
+    changed = {"camera_um_per_px_x": 21.0, "camera_um_per_px_y": 21.0}
+    furnish(opened.cell, camera_still_share=0.0, **changed)
+    affine = ("calibrate", "camera-affine", "--at", opened.at)
+    code, document, _ = opened.run(*affine, *usual)
+    assert code == 7
+    assert "The scale of the image changed by" in document["error"]["what"]
+    assert opened.cell.stored.rounded(3) == stored.rounded(3)
+    assert opened.run(*affine, "--new-camera", *usual)[0] == 0
 
 
 def test_a_table_of_runout_is_shown_and_given_as_json(desk):
@@ -213,9 +221,6 @@ sensor = "{cell.assist_url}"
         assert "board_held false" in world.out
         assert "contact_input none" in world.out
         cell.simulator.world.change_nozzle()
-        done = cell.run("-c", "line3", "calibrate", "camera", *usual)
-        assert done.code == 0, done.err
-        cell.simulator.world.change_nozzle()
         (tmp_path / "nozzle.toml").write_text(RECIPE)
         done = cell.run("-c", "line3", "recalibrate", "nozzle.toml", "--yes")
         assert done.code == 0, done.err
@@ -256,20 +261,6 @@ def test_what_cannot_be_is_refused_with_its_code_and_nothing_is_written(
     assert said in messages
     assert cell.stored == OLD_TIP
     assert cell.simulator.machine.tools.selected == 1
-
-
-def test_a_camera_that_changed_is_refused_until_a_person_says_it_is_another(desk):
-    opened = desk()
-    cell = opened.cell
-    usual = ("--tool", "1", "--station", "CAM", "--at", opened.at, "--sensor", SIM, "--yes")
-    assert opened.run(*AFFINE, *usual)[0] == 0
-    world, kept = cell.simulator.world, cell.stored
-    world.camera.optics = type(world.camera.optics)(um_per_px_x=21.0, um_per_px_y=21.0)
-    code, _, messages = opened.run(*AFFINE, *usual)
-    assert code == 7
-    assert "The scale of the image changed by" in messages
-    assert cell.stored == kept
-    assert opened.run(*AFFINE, "--new-camera", *usual)[0] == 0
 
 
 def test_a_look_before_shows_every_step_and_moves_nothing(desk):

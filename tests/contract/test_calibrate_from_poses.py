@@ -16,6 +16,7 @@ from robolink.methods import PointsSource
 from robolink.model import EntryKind, Hand, Pose, ToolOffset, rotate_xy
 
 REAL = ToolOffset(12.3, -3.9, -20.4)
+
 STORED = ToolOffset(12.0, -3.5, -20.0)
 """The initial tool 1 of a simulator."""
 
@@ -83,6 +84,7 @@ def calibrate(*more):
     return ("calibrate", "two-pose", "--tool", "1", *more)
 
 
+@pytest.mark.on_every_link
 def test_taught_points_give_the_tip_and_what_was_not_measured_is_kept(command, simulator):
     code, out, _ = command(*calibrate("--points", "901,902", "--yes"))
     assert code == 0
@@ -353,6 +355,7 @@ def test_an_undefined_taught_tool_is_refused(command):
     assert "Tool 9 is not defined" in err
 
 
+@pytest.mark.on_every_link
 def test_a_tool_changed_meanwhile_is_not_overwritten(command, simulator, monkeypatch):
     def change(tool, *, yes):
         simulator.machine.tools.set(1, ToolOffset(1, 2, 3))
@@ -364,6 +367,7 @@ def test_a_tool_changed_meanwhile_is_not_overwritten(command, simulator, monkeyp
     assert stored(simulator) == ToolOffset(1, 2, 3)
 
 
+@pytest.mark.on_every_link
 def test_the_impact_is_shown_before_the_question(command):
     code, out, _ = command(*calibrate("--points", "901,902", "--impact", "1-5"))
     assert code == 9

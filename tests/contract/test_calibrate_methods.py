@@ -10,6 +10,7 @@ from tests.contract._method_cell import KINDS, method_cell, on
 pytestmark = pytest.mark.simulator_only
 
 OLD = ToolOffset(12.0, -3.5, -20.0)
+TOUCHES = ("z-touch", "--station", "PLATE", "--speeds", "4,2,4,2,4,2,4")
 
 
 @pytest.fixture(params=KINDS)
@@ -85,6 +86,11 @@ def test_the_chain_asks_for_a_full_calibration_in_time(arm):
     refused = arm.calibrate("one-touch", "--station", "PIN-07", "--max-interval", "0.02")
     assert refused.code == 7
     assert refused.document["error"]["code"] == "large_interval"
+    # A tool that somebody changed has no last touch.
+    set_by_hand = ("--x", "1", "--y", "2", "--z", "-20", "--accept-jump", "20")
+    assert arm.run("tool", "set", "1", *set_by_hand).code == 0
+    refused = arm.calibrate("one-touch", "--station", "PIN-07")
+    assert (refused.code, refused.document["error"]["code"]) == (7, "reference_outdated")
 
 
 def test_one_touch_may_trust_the_place_of_the_pin(arm):
@@ -139,7 +145,8 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
     ("kind", "words", "which"),
     [
         ("epson", ("beams", "--station", "BEAMS-02", "--repeats", "3"), "Crossing"),
-        ("plc", ("z-touch", "--station", "PLATE", "--speeds", "4,2,4,2,4,2,4"), "Touch"),
+        ("epson", TOUCHES, "Touch"),
+        pytest.param("plc", TOUCHES, "Touch", marks=pytest.mark.soak),
     ],
 )
 def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaking(
@@ -205,14 +212,6 @@ def test_what_cannot_be_is_refused_and_nothing_is_written(arm, words, code, name
     assert arm.stored == OLD
 
 
-def test_a_tool_that_somebody_changed_has_no_last_touch(arm):
-    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "3").code == 0
-    set_by_hand = ("--x", "1", "--y", "2", "--z", "-20", "--accept-jump", "20")
-    assert arm.run("tool", "set", "1", *set_by_hand).code == 0
-    refused = arm.calibrate("one-touch", "--station", "PIN-07")
-    assert (refused.code, refused.document["error"]["code"]) == (7, "reference_outdated")
-
-
 def test_a_dry_run_lists_every_step_and_moves_nothing(arm):
     shown = arm.calibrate("n-angle", "--count", "4", "--until", "0.5", "--dry-run")
     assert shown.code == 0, shown.err
@@ -226,6 +225,8 @@ def test_a_bumped_pin_is_told_from_a_moved_tip(arm):
     nozzle = ("--nozzle", "N-1")
     assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", *nozzle).code == 0
     arm.bump_pin(0.3, -0.2)
+    doubted = arm.calibrate("one-touch", "--station", "PIN-07", "--no-verify", *nozzle)
+    assert "station_moved" in doubted.document["warnings"]
     found = arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", *nozzle)
     assert found.code == 0, found.err
     assert "station_moved" in found.document["warnings"]
@@ -234,14 +235,6 @@ def test_a_bumped_pin_is_told_from_a_moved_tip(arm):
     arm.lengthen(0.0, 0.3, 0.2)
     moved = arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", "--nozzle", "N-2")
     assert moved.document["warnings"] == []
-
-
-def test_a_bumped_pin_shows_by_one_touch_of_the_same_nozzle(arm):
-    nozzle = ("--nozzle", "N-1")
-    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", *nozzle).code == 0
-    arm.bump_pin(0.3, -0.2)
-    doubted = arm.calibrate("one-touch", "--station", "PIN-07", "--no-verify", *nozzle)
-    assert "station_moved" in doubted.document["warnings"]
 
 
 def test_ctrl_c_in_a_touch_leaves_the_old_value_and_the_tool_of_before(cell):

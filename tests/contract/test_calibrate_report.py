@@ -183,6 +183,11 @@ def test_a_live_calibration_is_reported_with_its_drifts(simulator, capsys, tmp_p
     page = page_of(tmp_path / "page.html")
     assert (code, document["report"]) == (0, "page.html")
     check_numbers(page, document["impact"])
+    assert document["source"] == {"kind": "live"}
+    before, after = document["before"], document["proposed"]
+    entry = next(one for one in document["impact"]["points"] if one["point"] == 1)
+    assert entry["dx_mm"] == pytest.approx(before["x_mm"] - after["x_mm"])
+    assert entry["dy_mm"] == pytest.approx(before["y_mm"] - after["y_mm"])
     assert "Written, read back and tested" in page
     assert "journal entries were checked when this page was made" in page
     for drift in document["verification"]["drifts"]:

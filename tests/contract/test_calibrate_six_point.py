@@ -124,6 +124,7 @@ def test_ctrl_c_on_a_way_puts_the_tool_back_and_writes_nothing():
     assert simulator.plc.memory.slot(1).tool == (*STORED, 0.0, 0.0, 0.0)
 
 
+@pytest.mark.soak
 def test_over_a_bus_touches_and_ways_go_the_same():
     simulator = turned_simulator(seed=9)
     with served("modbus-tcp", simulator) as cell, cell.connect() as controller:

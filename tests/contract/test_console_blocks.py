@@ -156,8 +156,11 @@ def commands(page):
 
 HERE = [page for page in PAGES if blocks(page)]
 
-LONG = dict.fromkeys(("README.zh.md", "recipes.md", "stations.md"), pytest.mark.soak)
-"""Whole needle changes and a search for beams; other tests of the default suite cover them."""
+LONG = dict.fromkeys(
+    ("README.zh.md", "poses.md", "recipes.md", "reference/contract_checks.md", "stations.md"),
+    pytest.mark.soak,
+)
+"""Whole needle changes, calibrations and checks; other tests of the default suite cover them."""
 
 CELLS = "".join(
     f"""[cells.{name}]

@@ -392,7 +392,11 @@ def test_a_simulator_that_fails_says_so(cells, at, monkeypatch):
 DOCUMENT = openapi()
 
 
-@pytest.mark.parametrize("method", ["GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"])
+OTHERS = ("HEAD", "PUT", "DELETE", "PATCH", "OPTIONS")
+"""Methods that no address has: each is tried at a part of them."""
+
+
+@pytest.mark.parametrize("method", ["GET", "POST", *OTHERS])
 def test_each_address_answers_the_methods_of_the_document_and_names_them_to_others(cells, method):
     base = urlsplit(cells.url).path
     kinds = {name: ACTS[cell.simulator.kind] for name, cell in cells.cells.items()}
@@ -402,7 +406,8 @@ def test_each_address_answers_the_methods_of_the_document_and_names_them_to_othe
         for name, acts in kinds.items()
         for act in acts
     ]
-    for path, address in addresses:
+    turn = slice(OTHERS.index(method), None, len(OTHERS)) if method in OTHERS else slice(None)
+    for path, address in addresses[turn]:
         operations = DOCUMENT["paths"][path].keys() - {"parameters"}
         allowed = ", ".join(it for it in ("GET", "POST") if it.lower() in operations)
         if method in allowed:

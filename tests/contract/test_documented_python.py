@@ -423,8 +423,9 @@ def test_the_test_of_an_integrator_s_program_passes_and_sees_a_changed_line(pyte
         (folder / name).write_text(text)
     pytester.makepyfile(BLOCKS["reference/structured_text.md 2"])
     pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
-    core = folder / "robolink_core.st"
-    core.write_text(core.read_text().replace("kept.slots[o0].tool := pose;", "raw := 0;"))
+    ours = folder / "robolink_program.st"
+    loses = "RL_Kept.memory.slots[2].tool[2] := 0.0;"
+    ours.write_text(ours.read_text().replace("\ntable(", f"\n{loses}\ntable("))
     result = pytester.runpytest_inprocess("-p", "no:cacheprovider")
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["E *ReadBack*", "*robolink wire: softmotion*", "*WRITE_TOOL*"])

@@ -17,7 +17,7 @@ from robolink.model import ControllerState
 CANARY = "k4nar1envogel"
 
 
-@pytest.mark.on_serial
+@pytest.mark.on_every_link
 def test_status_after_the_login(cell):
     with cell.connect() as controller:
         status = controller.status()
@@ -38,7 +38,7 @@ def test_the_right_password_opens(serve):
             assert controller.status().ready
 
 
-@pytest.mark.on_serial
+@pytest.mark.on_every_link
 @pytest.mark.fault("F16")
 @pytest.mark.parametrize("password", ["canary-wrong", None])
 @pytest.mark.fault("F71")

@@ -40,7 +40,7 @@ def start(controller, dx_mm=0.0, dz_mm=5.0, **pose):
     return group, target
 
 
-@pytest.mark.on_serial
+@pytest.mark.on_every_link
 def test_a_straight_move_arrives(controller):
     group, target = start(controller)
     motion = group.move_to(target, STRAIGHT, box=EVERYWHERE)
@@ -140,7 +140,7 @@ def test_motors_off_are_named_and_nothing_moves(cell):
         controller.motors(True)
 
 
-@pytest.mark.on_serial
+@pytest.mark.on_every_link
 def test_a_stop_from_another_thread_gets_in_while_one_waits(controller, monkeypatch):
     group, target = start(controller, dz_mm=30)
     motion = group.move_to(target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=EVERYWHERE)

@@ -30,7 +30,6 @@ HABITS: list[dict[str, Any]] = [
     {"second_client": "closed"},
     {"execute_on_disconnect": "stops"},
     {"logout_while_running": "refused"},
-    {"execute_failure": "text"},
     {"execute_failure_code": 20},
     {"flags_during_execute": "ready"},
     {"monitoring_refusal": 11},
@@ -51,6 +50,7 @@ HABITS: list[dict[str, Any]] = [
     {"real_pos_noise_mm": 0.0},
     {"till_already_met": "starts"},
     {"angle_wrap": True},
+    {"execute_failure": "text"},
     {"number_lead_blank": True, "requests_end_with_silence": False, "terminator": "lf"},
     {"error_state_after_failed_execute": False, "clear_selected_tool": "keeps"},
     {
@@ -118,27 +118,44 @@ ON_THE_WIRE = {
 """Options that affect bytes and connections; the others are alike on every link."""
 
 
-@pytest.fixture(params=HABITS, ids=name_of)
+SOAK = pytest.mark.soak
+
+
+def together(habits, most=6):
+    """Return habits that a controller has at the same time: each is met in few cells."""
+    met = [dict[str, Any]()]
+    for habit in filter(None, habits):
+        row = next((it for it in met[1:] if len(it) < most and not it.keys() & habit.keys()), None)
+        if row is None:
+            met.append(dict(habit))
+        else:
+            row.update(habit)
+    return met
+
+
+TOGETHER = together(HABITS)
+
+
+def link_for(habit):
+    return "tcp" if not habit or ON_THE_WIRE & habit.keys() else "sim"
+
+
+@pytest.fixture(params=[*TOGETHER, *(pytest.param(it, marks=SOAK) for it in HABITS)], ids=name_of)
 def habit(request):
     return request.param
 
 
-def links(habit):
-    """Return the links on which an option is tried, most of them in make soak."""
-    asked = {"sim", "tcp"} if not habit or ON_THE_WIRE & habit.keys() else {"sim"}
-    return [
-        pytest.param(
-            link,
-            habit,
-            marks=() if link in asked else pytest.mark.soak,
-            id=f"{link}-{name_of(habit)}",
-        )
-        for link in ("sim", "tcp", "pty")
-    ]
-
-
 ON_EVERY_LINK = pytest.mark.parametrize(
-    ("serve", "habit"), [case for habit in HABITS for case in links(habit)], indirect=True
+    ("serve", "habit"),
+    [
+        *(pytest.param(link_for(it), it, id=f"{link_for(it)}-{name_of(it)}") for it in TOGETHER),
+        *(
+            pytest.param(link, it, marks=SOAK, id=f"{link}-{name_of(it)}-alone")
+            for it in HABITS
+            for link in ("sim", "tcp", "pty")
+        ),
+    ],
+    indirect=True,
 )
 
 

@@ -38,7 +38,7 @@ def test_there_are_fifteen_tools_and_the_flange_reads_as_zero(controller):
     assert controller.tools.read(0) == ToolOffset()
 
 
-@pytest.mark.on_serial
+@pytest.mark.on_every_link
 def test_one_listing_and_single_reads_agree(controller):
     listed = controller.tools.read_all()
     for tool in (1, 2, SCRATCH):
@@ -49,7 +49,7 @@ def test_one_listing_and_single_reads_agree(controller):
             assert listed[tool].matches(single, 0.0005)
 
 
-@pytest.mark.on_serial
+@pytest.mark.on_every_link
 def test_a_write_is_read_back_and_receipted(controller):
     before = controller.tools.read(SCRATCH)
     receipt = controller.tools.write(SCRATCH, NEW, expected=before)

@@ -4,6 +4,7 @@ The judge is held to its own promises: from a log that has all of them, one is t
 """
 
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from robolink_simulators.epson.options import EpsonOptions
@@ -21,12 +22,20 @@ SPEEDS = {
 MOST_REQUESTS = {"needle-beams": 450}
 
 
-def log_of(folder, monkeypatch, example, comma="numeric"):
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(folder))
-    with touched(f"{example}.toml", options=EpsonOptions(comma_blank=comma)) as cell:
-        done = cell.change(*cell.words)
-        assert done.code == 0, done.err
-        return list(cell.simulator.log)
+@pytest.fixture(scope="module")
+def log_of(tmp_path_factory):
+    """Return the log of a change by a recipe, made once for the module."""
+
+    @cache
+    def changed(example, comma="numeric"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("ROBOLINK_STATE_DIR", str(tmp_path_factory.mktemp(example)))
+            with touched(f"{example}.toml", options=EpsonOptions(comma_blank=comma)) as cell:
+                done = cell.change(*cell.words)
+                assert done.code == 0, done.err
+                return tuple(cell.simulator.log)
+
+    return changed
 
 
 @pytest.mark.parametrize(
@@ -42,8 +51,8 @@ def log_of(folder, monkeypatch, example, comma="numeric"):
         pytest.param("needle-beams", "always", marks=pytest.mark.soak),
     ],
 )
-def test_every_movement_of_a_recipe_is_proved(tmp_path, monkeypatch, example, comma):
-    log = log_of(tmp_path, monkeypatch, example, comma)
+def test_every_movement_of_a_recipe_is_proved(log_of, example, comma):
+    log = log_of(example, comma)
     assert movements(log) > 25
     assert broken_promises(log, SPEEDS[example]) == []
     requests = sum(direction == ">" for _, direction, _ in log)
@@ -71,12 +80,6 @@ def test_every_movement_keeps_the_acceleration_that_the_cell_states(tmp_path, mo
     assert sum('"AccelS ' in text for _, _, text in log) == 2
     requests = sum(direction == ">" for _, direction, _ in log)
     assert requests <= MOST_REQUESTS.get(example, requests)
-
-
-@pytest.fixture(scope="module")
-def good(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        return log_of(tmp_path_factory.mktemp("good"), monkeypatch, "scara-pin")
 
 
 LOOK, POSE, MOVE = "Print Tool, Motor", "RealPos", '"Move '
@@ -128,7 +131,8 @@ def unwatched(log):
         (unwatched, "nobody looked for"),
     ],
 )
-def test_the_judge_finds_each_promise_that_is_missing(good, spoilt, why):
+def test_the_judge_finds_each_promise_that_is_missing(log_of, spoilt, why):
+    good = list(log_of("scara-pin", "numeric"))
     assert broken_promises(good, SPEEDS["scara-pin"]) == []
     found = broken_promises(spoilt(good), SPEEDS["scara-pin"])
     assert any(why in line for line in found), found

@@ -34,7 +34,7 @@ def place_points(simulator):
         simulator.machine.points.store(number, Point((x, y, -30.0, u, 0.0, 0.0)))
 
 
-@pytest.mark.parametrize("backend", ["sim", "tcp"])
+@pytest.mark.parametrize("backend", ["sim", pytest.param("tcp", marks=pytest.mark.soak)])
 def test_the_first_day(backend, tmp_path, capsys):
     simulator = EpsonSimulator(seed=7)
     place_points(simulator)

@@ -71,13 +71,9 @@ def test_a_person_on_record_is_held_to_it(arm, tmp_path, run):
     check_refused(run(arm, tmp_path))
 
 
-@pytest.mark.parametrize(
-    ("by", "station"), [("contact", PIN), ("poses", PIN), ("person", "PIN-08"), (None, PIN)]
-)
-def test_touches_that_were_made_otherwise_or_elsewhere_say_nothing_of_it(
-    arm, tmp_path, by, station
-):
-    has_touched(arm, by, station)
+def test_touches_that_were_made_otherwise_or_elsewhere_say_nothing_of_it(arm, tmp_path):
+    for by, station in (("contact", PIN), ("poses", PIN), ("person", "PIN-08"), (None, PIN)):
+        has_touched(arm, by, station)
     done = from_command(arm, tmp_path)
     assert done.code == 0, done.err
     assert arm.recorded(EntryKind.DONE)[0].details["touch"]["heights_by"] == "person"

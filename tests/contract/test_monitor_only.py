@@ -135,6 +135,7 @@ def test_looking_disturbs_nothing_whatever_the_controller_s_habits(serve, option
     assert simulator.machine.flash_writes == written
 
 
+@pytest.mark.on_every_link
 def test_an_idle_monitor_is_cut_off_and_production_goes_on(serve, options):
     simulator = in_production(options)
     with serve(simulator) as cell:

@@ -74,7 +74,7 @@ def epson_bench(backend, simulator=None):
         yield controller, simulator
 
 
-@pytest.fixture(params=["epson-sim", "epson-tcp", "plc-sim"])
+@pytest.fixture(params=["epson-sim", pytest.param("epson-tcp", marks=pytest.mark.soak), "plc-sim"])
 def bench(request):
     kind, backend = request.param.split("-")
     with plc_bench() if kind == "plc" else epson_bench(backend) as (controller, simulator):
@@ -85,6 +85,7 @@ def bench(request):
         yield Bench(controller, simulator, here.z_mm - PLATE_BELOW_MM)
 
 
+@pytest.mark.parametrize("bench", ["epson-sim", "epson-tcp", "plc-sim"], indirect=True)
 def test_the_tip_stops_at_the_edge_and_its_place_is_told(bench):
     tool = bench.controller.tools.selected()
     latched = bench.down().wait(timeout_s=30)

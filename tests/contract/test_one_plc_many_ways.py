@@ -46,7 +46,9 @@ def kill_a_calibration(url):
     controller.close()
 
 
-@pytest.mark.parametrize("killed", ["number", "name", "RTU", "CAN"])
+@pytest.mark.parametrize(
+    "killed", ["number", pytest.param("name", marks=pytest.mark.soak), "RTU", "CAN"]
+)
 def test_a_calibration_that_was_killed_blocks_whichever_way_the_next_one_comes(ways, killed):
     kill_a_calibration(ways[killed])
     for url in ways.values():

@@ -227,19 +227,19 @@ def test_an_array_that_changes_while_it_is_read_is_never_taken_for_a_tool(
         assert controller.tools.read(1) == due
 
 
-LOOKS_REFUSED = {
-    "opcua": PlcFault(PlcFaultAction.OUT_OF_SERVICE, match="read_response", every=1),
-    "modbus-tcp": PlcFault(PlcFaultAction.MODBUS_EXCEPTION, match="read_", code=6, every=1),
-}
+NO_SERVICE = PlcFault(PlcFaultAction.OUT_OF_SERVICE, match="read_response", every=1)
+LOOKS_REFUSED = PlcFault(PlcFaultAction.MODBUS_EXCEPTION, match="read_", code=6, every=1)
 BEATS_REFUSED = PlcFault(PlcFaultAction.MODBUS_EXCEPTION, match="beat", code=6, every=1)
 
 
 @pytest.mark.parametrize(
     ("medium", "fault", "command"),
     [
-        *((medium, fault, "WRITE_TOOL") for medium, fault in LOOKS_REFUSED.items()),
-        *((medium, fault, "MOVE_LINEAR") for medium, fault in LOOKS_REFUSED.items()),
+        ("opcua", NO_SERVICE, "WRITE_TOOL"),
+        ("modbus-tcp", LOOKS_REFUSED, "MOVE_LINEAR"),
         ("modbus-tcp", BEATS_REFUSED, "MOVE_LINEAR"),
+        pytest.param("opcua", NO_SERVICE, "MOVE_LINEAR", marks=pytest.mark.soak),
+        pytest.param("modbus-tcp", LOOKS_REFUSED, "WRITE_TOOL", marks=pytest.mark.soak),
     ],
     ids=lambda value: value if isinstance(value, str) else value.match,
 )

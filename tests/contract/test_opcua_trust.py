@@ -51,8 +51,21 @@ BLOCK = (*[7] * 62, 0, 7)
 
 
 @pytest.fixture(scope="module")
-def server():
-    with serve_opcua(SoftMotionSimulator(), users={USER: Secret(PASSWORD)}) as host:
+def plc():
+    """The PLC behind both servers."""
+    return SoftMotionSimulator()
+
+
+@pytest.fixture(scope="module")
+def server(plc):
+    with serve_opcua(plc, users={USER: Secret(PASSWORD)}) as host:
+        yield host
+
+
+@pytest.fixture(scope="module")
+def open_server(plc):
+    """One that knows no users."""
+    with serve_opcua(plc) as host:
         yield host
 
 
@@ -118,28 +131,27 @@ def test_what_would_not_be_safe_is_refused_by_name(server, options, password, er
         assert "cell trust" in told.value.remedy
 
 
-def test_without_a_user_or_encryption_it_only_reads_and_stops():
-    simulator = SoftMotionSimulator()
-    with serve_opcua(simulator) as server:
-        for options in ("security=none", f"server_certificate={server.fingerprint}"):
-            url, sent = f"{bare(server)}?{options}", simulator.plc.program.inbox.words
-            with opened(url, "") as link:
-                assert link.read_response()
-                with pytest.raises(ConfigError, match="for reading only"):
-                    link.beat(0x0101)
-            with robolink.connect(url) as plc, pytest.raises(ConfigError, match="reading only"):
-                plc.tools.write(3, TOOL, expected=None)
-            assert simulator.plc.program.inbox.words == sent
-            assert stop_now(url).state
-            with robolink.connect(url) as plc:
-                plc.stop()
-                with pytest.raises(ConfigError, match="reading only"):
-                    plc.reset_fault()
-        arrived = [text for _, way, text in simulator.log if way == ">"]
-        writes = [text.split()[:2] for text in arrived if text.startswith(("write", "beat"))]
-        assert writes == [["write_command", "STOP"]] * 4
-        with opened(f"{bare(server)}?security=none&write_unsecured=yes", "") as link:
-            link.beat(0x0101)
+def test_without_a_user_or_encryption_it_only_reads_and_stops(plc, open_server):
+    plc.log.clear()
+    for options in ("security=none", f"server_certificate={open_server.fingerprint}"):
+        url, sent = f"{bare(open_server)}?{options}", plc.plc.program.inbox.words
+        with opened(url, "") as link:
+            assert link.read_response()
+            with pytest.raises(ConfigError, match="for reading only"):
+                link.beat(0x0101)
+        with robolink.connect(url) as it, pytest.raises(ConfigError, match="reading only"):
+            it.tools.write(3, TOOL, expected=None)
+        assert plc.plc.program.inbox.words == sent
+        assert stop_now(url).state
+        with robolink.connect(url) as it:
+            it.stop()
+            with pytest.raises(ConfigError, match="reading only"):
+                it.reset_fault()
+    arrived = [text for _, way, text in plc.log if way == ">"]
+    writes = [text.split()[:2] for text in arrived if text.startswith(("write", "beat"))]
+    assert writes == [["write_command", "STOP"]] * 4
+    with opened(f"{bare(open_server)}?security=none&write_unsecured=yes", "") as link:
+        link.beat(0x0101)
 
 
 def test_a_key_that_others_can_read_holds_no_stop_back_and_is_told(cell, server, capsys):
@@ -525,35 +537,30 @@ def test_stop_from_a_terminal_logs_in_as_the_cell_says(cell, server, capsys):
     assert main.run(["-c", "line3", "stop"]) == 0, capsys.readouterr().err
 
 
-def test_status_says_how_a_connection_is_protected(capsys):
-    with serve_opcua(SoftMotionSimulator()) as server:
-        for options, said in (
-            ("security=none&write_unsecured=yes", "WITHOUT ENCRYPTION"),
-            ("security=none", "only reads"),
-            (f"server_certificate={server.fingerprint}", "Nobody logs in"),
-        ):
-            assert main.run(["-c", f"{bare(server)}?{options}", "status"]) == 0
-            assert said in capsys.readouterr().err
+def test_status_says_how_a_connection_is_protected(open_server, capsys):
+    for options, said in (
+        ("security=none&write_unsecured=yes", "WITHOUT ENCRYPTION"),
+        ("security=none", "only reads"),
+        (f"server_certificate={open_server.fingerprint}", "Nobody logs in"),
+    ):
+        assert main.run(["-c", f"{bare(open_server)}?{options}", "status"]) == 0
+        assert said in capsys.readouterr().err
 
 
-def test_every_command_says_that_it_may_write_without_encryption(tmp_path, monkeypatch, capsys):
+def test_every_command_says_that_it_may_write_without_encryption(
+    open_server, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     told: list[str] = []
-    with serve_opcua(SoftMotionSimulator()) as server:
-        url = f"{bare(server)}?security=none&write_unsecured=yes"
-        (tmp_path / "robolink.toml").write_text(f'[cells.a]\nurl = "{url}"\n')
-        for argv in (["check"], ["expert", "verify-controller"], ["stop"]):
-            main.run(["-c", "a", *argv])
-            assert "WITHOUT ENCRYPTION" in capsys.readouterr().err, argv
-        with CellActs(tmp_path / "backups", tell=told.append) as acts:
-            table = {
-                "schema": "robolink/fleet-plan/1",
-                "kind": "check",
-                "name": "n",
-                "cells": ["a"],
-            }
-            plan = plan_of(table, cells=["a"], author="Li", made_at="2026-11-30T22:00:00+00:00")
-            assert [acts(plan, "a", None).error for _ in range(2)] == ["", ""]
+    url = f"{bare(open_server)}?security=none&write_unsecured=yes"
+    (tmp_path / "robolink.toml").write_text(f'[cells.a]\nurl = "{url}"\n')
+    for argv in (["check"], ["expert", "verify-controller"], ["stop"]):
+        main.run(["-c", "a", *argv])
+        assert "WITHOUT ENCRYPTION" in capsys.readouterr().err, argv
+    with CellActs(tmp_path / "backups", tell=told.append) as acts:
+        table = {"schema": "robolink/fleet-plan/1", "kind": "check", "name": "n", "cells": ["a"]}
+        plan = plan_of(table, cells=["a"], author="Li", made_at="2026-11-30T22:00:00+00:00")
+        assert [acts(plan, "a", None).error for _ in range(2)] == ["", ""]
     assert len(told) == 1
     assert told[0].startswith("a: OPC UA WITHOUT ENCRYPTION")
     path = written_symbol_map(tmp_path)
@@ -563,7 +570,7 @@ def test_every_command_says_that_it_may_write_without_encryption(tmp_path, monke
             assert "WITHOUT ENCRYPTION" in capsys.readouterr().err, more
 
 
-def test_a_page_of_a_change_says_how_the_plc_was_reached(tmp_path, monkeypatch):
+def test_a_page_of_a_change_says_how_the_plc_was_reached(open_server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     points = tmp_path / "a.pts"
     place = "\n".join(f"\tr{axis}={value}" for axis, value in zip("XYZUVW", range(6), strict=True))
@@ -571,10 +578,9 @@ def test_a_page_of_a_change_says_how_the_plc_was_reached(tmp_path, monkeypatch):
         f"nNumberOfPoints=1\nPoint1 {{\n\tnNumber=1\n\tnUndefined=448\n{place}\n"
         "\tnLocal=0\n\tnHand=1\n}\n"
     )
-    with serve_opcua(SoftMotionSimulator()) as server:
-        url = f"{bare(server)}?security=none&write_unsecured=yes"
-        argv = ["-c", url, "tool", "impact", "--tool", "1", "--x", "2", "--pts", str(points)]
-        assert main.run([*argv, "--report", "page.html"]) == 0
+    url = f"{bare(open_server)}?security=none&write_unsecured=yes"
+    argv = ["-c", url, "tool", "impact", "--tool", "1", "--x", "2", "--pts", str(points)]
+    assert main.run([*argv, "--report", "page.html"]) == 0
     assert "OPC UA WITHOUT ENCRYPTION" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 

@@ -170,6 +170,7 @@ def test_a_lost_answer_is_not_sent_again_and_settled_by_the_next_connection(serv
             assert finding.verdict is Verdict.CONFLICT
 
 
+@pytest.mark.parametrize("served", [CELLS[0]], ids="-".join, indirect=True)
 def test_a_calibration_takes_its_poses_from_a_person(served):
     class Person:
         def tell(self, text):

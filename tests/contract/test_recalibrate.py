@@ -1,4 +1,4 @@
-"""``recalibrate``: the example recipes and their settings, on a served simulator."""
+"""``recalibrate``: the example recipes and their settings, on a simulator."""
 
 import json
 import signal
@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 from robolink_simulators.epson.memory.points import Point
 
-from robolink.journal import open_journal
 from robolink.model import EntryKind, Pose, ToolOffset, rotate_xy
-from tests.faults._nozzle_cell import OLD_TIP, served_cell
+from tests.faults._nozzle_cell import OLD_TIP, cell_in_process, served_cell
 from tests.faults._requests import changes
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]
@@ -49,6 +48,14 @@ number = 1
 
 @pytest.fixture
 def cell(tmp_path, monkeypatch):
+    with cell_in_process(tmp_path / "cell", monkeypatch) as cell:
+        cell.simulator.machine.motors_on = True
+        yield cell
+
+
+@pytest.fixture
+def served(tmp_path, monkeypatch):
+    """The cell on a port, for another process and for one whole change over a socket."""
     with served_cell(tmp_path / "cell", monkeypatch) as cell:
         cell.simulator.machine.motors_on = True
         yield cell
@@ -86,10 +93,11 @@ def teach(cell, tip):
 
 
 def journal(cell, *kinds):
-    return list(open_journal().log(cell.url).recorded(kinds=kinds))
+    return list(cell.journal.log(cell.url).recorded(kinds=kinds))
 
 
-def test_a_scara_with_a_pin_and_a_person(cell):
+def test_a_scara_with_a_pin_and_a_person(served):
+    cell = served
     done = assisted(cell, str(EXAMPLES / "scara-pin.toml"), "--nozzle", "N-7", "--operator", "anna")
     assert done.code == 0, done.err
     assert aside(cell.tool_1, truth(cell))
@@ -104,7 +112,7 @@ def test_a_scara_with_a_pin_and_a_person(cell):
     assert len(calibration.details["poses"]) == 2
     assert "change up to 2 mm" in calibration.tolerance
     assert calibration.change == entry.change
-    assert open_journal().verify().problems == ()
+    assert cell.journal.verify().problems == ()
 
 
 def test_a_file_of_poses_stands_for_the_points_of_a_tool(cell, recipe, tmp_path):
@@ -134,7 +142,8 @@ def test_poses_that_say_another_tool_than_the_recipe_are_refused(cell, recipe, t
     assert cell.tool_1 == OLD_TIP
 
 
-def test_pendant_points_only_and_nothing_moves(cell):
+def test_pendant_points_only_and_nothing_moves(served):
+    cell = served
     path = str(EXAMPLES / "pendant-points.toml")
     teach(cell, ToolOffset(12.3, -3.4, -20))
     refused = cell.run("recalibrate", path, "--yes")
@@ -166,26 +175,6 @@ def test_pendant_points_only_and_nothing_moves(cell):
     tips = {c["axis"]: c["points"] for c in charted["charts"] if c["quantity"] == "tip"}
     assert set(tips) == {"x", "y"}, "Z was kept"
     assert [p["value_mm"] for p in tips["x"]][-2:] == pytest.approx([12.5, 12.4], abs=2e-3)
-
-
-def test_two_nozzles_on_one_head(cell):
-    cell.simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20))
-    cell.simulator.world.change_nozzle(2)
-    done = assisted(cell, str(EXAMPLES / "two-nozzles.toml"), "--json")
-    assert done.code == 0, done.err
-    assert aside(cell.tool_1, truth(cell, 1))
-    assert aside(cell.simulator.machine.tools.get(2), truth(cell, 2))
-    requests = cell.requests
-    first_write = next(n for n, text in enumerate(requests) if "TLSet" in text and "XY" in text)
-    measured = [entry.number for entry in journal(cell, EntryKind.CALIBRATION)]
-    written = [entry.number for entry in journal(cell, EntryKind.WRITE)]
-    assert len(measured) == len(written) == 2
-    assert max(measured) < min(written)
-    assert "$SetIO,8,0" not in requests[first_write:]
-    # The backup before the very first write belongs to no change.
-    changes_known = {e.change for e in journal(cell) if e.kind is not EntryKind.BACKUP}
-    assert len(changes_known) == 1
-    assert [tool["write"]["skipped"] for tool in json.loads(done.out)["tools"]] == [False, False]
 
 
 def test_two_nozzles_are_written_both_or_none(cell):
@@ -385,10 +374,10 @@ def test_a_jump_takes_an_engineer(cell, recipe, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("nth", [2, 7, 12])
-def test_ctrl_c_during_a_recipe_leaves_the_old_value_and_the_tool_selected(cell, nth, recipe):
+def test_ctrl_c_during_a_recipe_leaves_the_old_value_and_the_tool_selected(served, nth):
     from tests.faults._client_process import ClientProcess
 
-    moves = []
+    cell, moves = served, []
 
     def press(_number, text):
         if '"Move ' in text or '"Go ' in text:

@@ -122,6 +122,7 @@ def test_a_served_cell_lends_its_camera_through_the_assist_port(tmp_path, monkey
         assert "camera" in page.read_text()
 
 
+@pytest.mark.soak
 def test_the_same_recipe_serves_a_plc(run, plc, tmp_path, capsys):
     url, simulator, clock = plc("Kin_Scara3_Z")
     recipe = recipe_here(SensorCell(simulator, url, clock), Path(CAMERA), tmp_path)

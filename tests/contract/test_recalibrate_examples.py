@@ -12,7 +12,8 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.tip_switches import LightBeam
 
-from robolink.model import ToolOffset
+from robolink.journal import memory_journal
+from robolink.model import EntryKind, ToolOffset
 from robolink.recipe import load_recipe
 from tests.contract._sensor_cell import sensor_cell
 from tests.contract._shipped_cells import seconds_of_touches
@@ -85,3 +86,25 @@ def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, examp
             assert abs(getattr(found, name) - getattr(true, name)) <= 2 * half + 0.0005
             assert half <= 0.05
         assert tool["verification"]["passed"]
+        assert tool["write"]["skipped"] is False
+    if example == "two-nozzles":
+        both_are_measured_before_one_is_written(cell)
+    if example == "needle-beams":
+        (measured,) = memory_journal(cell.url).entries(kinds=(EntryKind.CALIBRATION,))
+        assert "two crossed beams" in str(measured.details["source"])
+        assert measured.details["method"] == "beams"
+
+
+def both_are_measured_before_one_is_written(cell):
+    entries = list(memory_journal(cell.url).entries())
+    measured = [entry.number for entry in entries if entry.kind is EntryKind.CALIBRATION]
+    written = [entry.number for entry in entries if entry.kind is EntryKind.WRITE]
+    assert len(measured) == len(written) == 2
+    assert max(measured) < min(written)
+    requests = [text for _, direction, text in cell.simulator.log if direction == ">"]
+    first_write = next(n for n, text in enumerate(requests) if "TLSet" in text and "XY" in text)
+    assert requests.index("$SetIO,8,1") > first_write
+    assert "$SetIO,8,0" not in requests[first_write:]
+    # The backup before the very first write belongs to no change.
+    changes = {e.change for e in entries if e.kind is not EntryKind.BACKUP}
+    assert len(changes - {""}) == 1

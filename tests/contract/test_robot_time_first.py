@@ -62,7 +62,7 @@ def test_a_robot_of_a_known_model_is_timed_by_what_its_maker_says():
         assert said["answer_ms"] == 20
         sent = []
         cell.simulator.on_request = lambda _number, request: sent.append(str(request))
-        again = cell.change(*cell.words).document
+        again = cell.change("--dry-run", "--json").document
         assert again["robot_time"]["earlier_runs"] == 1
         assert not [one for one in sent if "SpeedFactor" in one or "TargetOK" in one]
 

@@ -99,7 +99,18 @@ def always_broken(cell):
 
 
 def test_a_round_by_the_program_finds_what_robolink_finds(cells):
+    """The speed of travel, in which the tip goes from side to side, would shift every edge."""
     program, driver = cells(), cells()
+    searched: set[float] = set()
+    travelled: set[float] = set()
+    machine = program.simulator.machine
+
+    def note(_task, file, _number, text):
+        if file == "recal.prg" and text.lstrip().startswith("Move "):
+            speeds = searched if "Till" in text else travelled
+            speeds.add(machine.parameters.speed_s[0])
+
+    program.runner.on_statement = note
     before = program.tool
     code, report = by_driver(driver)
     began_ns = program.simulator.now_ns
@@ -122,6 +133,8 @@ def test_a_round_by_the_program_finds_what_robolink_finds(cells):
             "acceleration_mm_s2": 200.0,
         }
     ]
+    assert (searched, travelled) == ({8.0}, {60.0})
+    assert {decode_line(line).fields[4] for line in rounds(program)} == {"8000"}
     assert len(rounds(program)) == 3
     assert max(map(len, program.calls.questions)) <= 255
 
@@ -220,24 +233,6 @@ def test_a_round_is_driven_in_low_power_and_leaves_production_as_it_was(tmp_path
     assert cell.run() == ["kept", "1", "50", "30", "200", "100", "2"]
     assert set(moved) == {None, (False, 1)}
     cell.close()
-
-
-def test_every_search_has_the_speed_that_its_line_tells(cells):
-    """The speed of travel, in which the tip goes from side to side, would shift every edge."""
-    cell = cells()
-    searched: set[float] = set()
-    travelled: set[float] = set()
-    machine = cell.simulator.machine
-
-    def note(_task, file, _number, text):
-        if file == "recal.prg" and text.lstrip().startswith("Move "):
-            speeds = searched if "Till" in text else travelled
-            speeds.add(machine.parameters.speed_s[0])
-
-    cell.runner.on_statement = note
-    assert by_program(cell) == ""
-    assert (searched, travelled) == ({8.0}, {60.0})
-    assert {decode_line(line).fields[4] for line in rounds(cell)} == {"8000"}
 
 
 @pytest.mark.parametrize("side", [1, 3])

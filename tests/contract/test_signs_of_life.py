@@ -90,7 +90,6 @@ def changed(controller, offset=NEW, before=OLD):
     return ToolChange(controller, [Wanted(1, offset, before)], verify=True)
 
 
-@pytest.mark.parametrize("plc", ["sim", "modbus-tcp", "can-multicast"], indirect=True)
 def test_a_quiet_change_is_not_taken_back_by_a_second_pc(plc):
     with plc.connect(ANN) as first, changed(first) as change:
         change.write()

@@ -124,13 +124,19 @@ TURNS = 4
 @pytest.mark.parametrize("turns", [TURNS, pytest.param(1, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("simulated", [EpsonSimulator, SoftMotionSimulator])
 def test_no_value_of_any_act_stops_the_assist_port(simulated, turns):
-    """Of the world's many parameters, each value is given to every fourth, in turn."""
+    """Of the world's many parameters, each value is given to every fourth, in turn.
+
+    An act that both kinds have gets half of the values on each.
+    """
     simulator, clock = simulated(seed=3), ScaledClock(50)
     acts = {name: act for name, act in ACTS[simulator.kind].items() if name != "set_world"}
+    shared, of_an_epson = set(ACTS["epson"]) & set(ACTS["softmotion"]), simulator.kind == "epson"
     usual = {"axis": "z", "text": "a", "name": "a", "action": "delay", "order": "low_first"}
     with serve_assist(simulator, clock=clock) as port, AssistClient(port.url) as assist:
         for turn, value in enumerate(HOSTILE):
             for act in acts.values():
+                if act.name in shared and turns > 1 and turn % 2 == of_an_epson:
+                    continue
                 given = {taken.name: usual.get(taken.name, 1) for taken in act.takes}
                 for name in (*given, "unknown"):
                     with suppress(ConfigError):

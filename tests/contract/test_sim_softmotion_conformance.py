@@ -45,7 +45,7 @@ from tests.unit._mailbox_client import (
 UP = (0.0, 0.0, 50.0, 0.0, 0.0, 0.0)
 
 
-@pytest.fixture(params=["sim", "modbus-tcp"])
+@pytest.fixture(params=["sim", pytest.param("modbus-tcp", marks=pytest.mark.soak)])
 def machine(request):
     """Makes a client that owns the mailbox of a new machine, by the name of its kinematics."""
     with ExitStack() as served:
@@ -241,6 +241,7 @@ def test_12_a_movement_is_done_in_one_cycle_and_the_group_in_standby_in_the_next
     assert client.now().finished[0] == (sequence, CommandState.DONE, ErrorClass.NONE)
 
 
+@pytest.mark.parametrize("machine", ["sim", "modbus-tcp"], indirect=True)
 def test_13_a_stop_holds_until_it_is_released(client):
     client.move(z=-5.0)
     client.done(Opcode.STOP)

@@ -20,10 +20,11 @@ from robolink.protocols.mailbox import ErrorClass
 from tests.contract._softmotion_cell import SLOW, above, served
 
 ANYWHERE = WorkBox()
+BOTH = pytest.mark.parametrize("cell", ["sim", "modbus-tcp"], indirect=True)
 BACK_ALONG_X = Jog(backward=frozenset({0}), speed_mm_s=10.0)
 
 
-@pytest.fixture(params=["sim", "modbus-tcp"])
+@pytest.fixture(params=["sim", pytest.param("modbus-tcp", marks=pytest.mark.soak)])
 def cell(request):
     with served(request.param) as cell:
         yield cell
@@ -52,6 +53,7 @@ def look_for(cell, controller, seconds):
         cell.clock.advance(0.1)
 
 
+@BOTH
 def test_a_permit_that_is_withdrawn_ends_the_jog_and_no_status_moves_it_on(cell, controller):
     group, simulator = controller.groups[0], cell.simulator
     start = group.pose()
@@ -63,7 +65,7 @@ def test_a_permit_that_is_withdrawn_ends_the_jog_and_no_status_moves_it_on(cell,
     assert refusal.value.code == ErrorClass.NOT_PERMITTED
     moved_mm = distance_mm(controller, start)
     assert 2.0 < moved_mm < 6.0
-    look_for(cell, controller, 40.0)
+    look_for(cell, controller, 5.0)
     assert distance_mm(controller, start) == pytest.approx(moved_mm, abs=0.01)
     assert not controller.status().running
     assert cell.open_requests == []
@@ -76,6 +78,7 @@ def taken_over(cell, controller, command):
     )
 
 
+@BOTH
 def test_a_jog_that_another_program_takes_over_ends_at_once(cell, controller):
     group = controller.groups[0]
     start = group.pose()
@@ -111,6 +114,7 @@ def test_a_movement_that_another_program_takes_over_is_said_to_be(cell, controll
         group.move_to(start, SLOW, box=ANYWHERE)
 
 
+@BOTH
 def test_a_stop_from_another_thread_ends_the_jog_and_is_no_success(cell, controller, monkeypatch):
     group = controller.groups[0]
     start = group.pose()

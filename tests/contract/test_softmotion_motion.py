@@ -22,12 +22,11 @@ from robolink.errors import (
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols.mailbox import CoordinateSystem, ErrorClass
 from tests.contract._softmotion_cell import (
-    FEW_LINKS,
     LINKS,
-    LINKS_BUT_OPCUA,
     QUICK,
     SLOW,
     above,
+    few_links,
     on_links,
     served,
 )
@@ -35,7 +34,7 @@ from tests.contract._softmotion_cell import (
 ANYWHERE = WorkBox()
 
 
-@pytest.fixture(params=FEW_LINKS)
+@pytest.fixture(params=few_links())
 def cell(request):
     with served(request.param) as cell:
         yield cell
@@ -70,7 +69,7 @@ def test_a_joint_move_turns_the_tool(group):
     assert group.pose().u_deg == pytest.approx(target.u_deg, abs=1e-6)
 
 
-@pytest.mark.parametrize("cell", LINKS_BUT_OPCUA, indirect=True)
+@pytest.mark.parametrize("cell", few_links("modbus-tcp"), indirect=True)
 def test_four_movements_may_be_under_way_and_a_fifth_has_to_wait(cell, group):
     start = group.pose()
     ways = [above(start, by_mm) for by_mm in (2.0, 3.0, 1.0, 0.0)]
@@ -116,7 +115,7 @@ def test_a_disabled_group_is_not_moved(cell, controller, group):
     assert cell.movements_started == 0
 
 
-@pytest.mark.parametrize("cell", LINKS, indirect=True)
+@pytest.mark.parametrize("cell", few_links("modbus-tcp", "can-multicast", "opcua"), indirect=True)
 def test_a_stop_from_another_thread_gets_in_holds_and_is_released_by_a_reset(
     cell, controller, group, monkeypatch
 ):
@@ -150,7 +149,7 @@ def test_a_stop_from_another_thread_gets_in_holds_and_is_released_by_a_reset(
     assert cell.open_requests == []
 
 
-@pytest.mark.parametrize("cell", LINKS, indirect=True)
+@pytest.mark.parametrize("cell", few_links("opcua"), indirect=True)
 def test_a_halted_movement_ends_where_it_is_and_the_group_moves_again(cell, group):
     start = group.pose()
     motion = group.move_to(above(start, 20.0), SLOW, box=ANYWHERE)
@@ -172,7 +171,10 @@ def test_a_move_that_takes_too_long_is_halted_and_its_end_is_seen(cell, group):
 @pytest.mark.fault("F21")
 @pytest.mark.parametrize(
     ("danger", "cell"),
-    [*on_links("press_estop", LINKS), *on_links("fail_axis", LINKS_BUT_OPCUA)],
+    [
+        *on_links("press_estop", few_links("opcua")),
+        *on_links("fail_axis", few_links("modbus-tcp")),
+    ],
     indirect=["cell"],
 )
 def test_an_emergency_stop_or_a_failing_drive_ends_the_move_and_nothing_is_sent_again(
@@ -195,7 +197,7 @@ def test_an_emergency_stop_or_a_failing_drive_ends_the_move_and_nothing_is_sent_
     assert group.move_to(near, QUICK, box=ANYWHERE).wait(timeout_s=10) is MotionOutcome.ARRIVED
 
 
-@pytest.mark.parametrize("cell", LINKS, indirect=True)
+@pytest.mark.parametrize("cell", few_links("modbus-tcp", "can-multicast", "opcua"), indirect=True)
 def test_a_jog_goes_for_a_time_and_the_group_is_at_rest_afterwards(cell, controller, group):
     start = group.pose()
     jog = Jog(forward=frozenset({2}), speed_mm_s=10.0)
@@ -222,7 +224,7 @@ def test_a_jog_of_an_axis_goes_by_a_share_of_its_own_speed(group):
     assert after[1:] == pytest.approx(before[1:])
 
 
-@pytest.mark.parametrize("cell", LINKS, indirect=True)
+@pytest.mark.parametrize("cell", few_links("opcua"), indirect=True)
 def test_a_movement_on_which_nobody_waits_is_halted_on_purpose(cell, group):
     motion = group.move_to(above(group.pose(), 20.0), SLOW, box=ANYWHERE)
     cell.clock.advance(0.6)

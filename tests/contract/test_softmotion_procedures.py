@@ -24,12 +24,11 @@ from robolink.errors import (
 from robolink.model import ANY, ControllerState, EntryKind, ToolOffset, Verdict, WorkBox
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from tests.contract._softmotion_cell import (
-    FEW_LINKS,
     LINKS,
-    LINKS_BUT_OPCUA,
     OWNER_SILENCE_S,
     QUICK,
     above,
+    few_links,
     on_links,
     served,
 )
@@ -40,7 +39,7 @@ OTHER = ToolOffset(1.0, 2.0, 3.0, 0.0, 20.0)
 TIMEOUT_S = 0.4
 
 
-@pytest.fixture(params=FEW_LINKS)
+@pytest.fixture(params=few_links())
 def cell(request):
     with served(request.param) as cell:
         yield cell
@@ -112,6 +111,9 @@ def test_a_backup_goes_through_a_file_and_a_restore_brings_it_back(cell, control
     assert [cell.slot_changes(tool) for tool in (1, 3, 4)] == [count + 1 for count in changes]
 
 
+@pytest.mark.parametrize(
+    "cell", ["modbus-tcp", pytest.param("sim", marks=pytest.mark.soak)], indirect=True
+)
 def test_a_nozzle_change_finds_the_true_tip_writes_it_once_and_proves_it(cell, controller):
     world, before = cell.simulator.world, cell.slot_changes(1)
 
@@ -143,7 +145,7 @@ SETTLED = {
 
 @pytest.mark.parametrize(
     ("ended", "cell"),
-    [*on_links("done", LINKS), *on_links("not applied", LINKS_BUT_OPCUA)],
+    [*on_links("done", LINKS), *on_links("not applied", few_links("modbus-tcp"))],
     indirect=["cell"],
 )
 def test_a_write_without_an_answer_is_settled_by_reading(cell, ended):

@@ -72,7 +72,7 @@ class Watch:
         return [kind for gap in self.gaps for kind in gap if kind in LONG]
 
 
-@pytest.mark.parametrize("baud", [9600, 19200])
+@pytest.mark.parametrize("baud", [9600, pytest.param(19200, marks=pytest.mark.soak)])
 def test_one_whole_look_at_the_beginning_then_the_head_alone(baud):
     with line_at(baud, carried=False) as (simulator, controller):
         group, watch = controller.groups[0], Watch(simulator)
@@ -92,15 +92,15 @@ def test_a_jog_has_a_beat_before_each_whole_look():
     watch.require_beats_around_long_ones()
 
 
-@pytest.mark.parametrize("what", ["slots", "states"])
-def test_another_thread_that_reads_all_the_time_lets_every_beat_through(what):
+def test_another_thread_that_reads_all_the_time_lets_every_beat_through():
     with line_at(9600) as (simulator, controller):
         group, watch = controller.groups[0], Watch(simulator)
-        over, reads = threading.Event(), []
+        over = threading.Event()
+        reads: list[object] = []
 
         def read_on():
             while not over.is_set():
-                reads.append(controller.tools.read(1) if what == "slots" else controller.status())
+                reads.extend((controller.tools.read(1), controller.status()))
 
         target = above(group.pose(), 3.0)
         reader = threading.Thread(target=read_on)
@@ -117,7 +117,7 @@ def test_another_thread_that_reads_all_the_time_lets_every_beat_through(what):
     watch.require_beats_around_long_ones()
 
 
-@pytest.mark.parametrize("baud", [1200, 2400, 4800])
+@pytest.mark.parametrize("baud", [1200, pytest.param(2400, marks=pytest.mark.soak), 4800])
 def test_a_line_that_is_too_slow_to_beat_moves_nothing_and_says_so(baud):
     with line_at(baud, carried=False) as (simulator, controller):
         group = controller.groups[0]

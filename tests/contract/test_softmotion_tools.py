@@ -19,7 +19,7 @@ from robolink.errors import (
 )
 from robolink.model import ANY, ToolOffset, WorkBox
 from robolink.protocols.mailbox import ErrorClass, ReadMode, frames_match
-from tests.contract._softmotion_cell import FEW_LINKS, LINKS, QUICK, above, served
+from tests.contract._softmotion_cell import LINKS, QUICK, above, few_links, served
 
 SCRATCH = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0, 30.0, -40.0)
@@ -30,7 +30,7 @@ OTHER = ToolOffset(9.0, 9.0, 9.0)
 ANYWHERE = WorkBox()
 
 
-@pytest.fixture(params=FEW_LINKS)
+@pytest.fixture(params=few_links())
 def backend(request):
     return request.param
 
@@ -53,7 +53,7 @@ def put_into_scratch(cell, x_mm):
         cell.simulator.plc.memory.define(SCRATCH, (x_mm, 9.0, 9.0, 0.0, 0.0, 0.0), "panel")
 
 
-@pytest.mark.parametrize("backend", LINKS, indirect=True)
+@pytest.mark.parametrize("backend", few_links("modbus-rtu"), indirect=True)
 def test_there_are_fifteen_slots_and_the_flange_reads_as_zero(controller):
     read = controller.tools.read_all()
     assert list(read) == list(controller.tools.indices()) == list(range(1, 16))

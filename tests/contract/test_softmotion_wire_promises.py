@@ -11,7 +11,7 @@ from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.controllers import Jog
 from robolink.model import MotionOutcome, MotionProfile, Path, ToolOffset, WorkBox
 from robolink.protocols.mailbox import Bits, GroupState, Opcode, next_number
-from tests.contract._softmotion_cell import BACKENDS, LINKS, QUICK, above, served
+from tests.contract._softmotion_cell import BACKENDS, QUICK, above, few_links, served
 from tests.contract._softmotion_wire_promises import (
     MOVES,
     RIDES,
@@ -90,7 +90,7 @@ def exercised(cell, *, speed_mm_s=10.0):
     return log
 
 
-@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize("link", few_links("modbus-tcp", "can-multicast"))
 def test_moves_writes_and_selections_keep_them_on_every_link(link):
     with served(link) as cell:
         assert WireLog(exercised(cell)).broken() == []

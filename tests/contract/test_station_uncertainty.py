@@ -41,7 +41,8 @@ def test_beams_that_were_learnt_carry_their_uncertainty_into_the_tip(arm, shaft_
     assert arm.run(*learn, "--json").code == 0
     arm.mount()
     details = arm.recorded(EntryKind.STATION)[0].details
-    for line in details["beams"]:
+    for line, heading in zip(details["beams"], (3.0, 88.0), strict=True):
+        assert line["direction_deg"] == pytest.approx(heading, abs=0.2)
         assert line["sigma_mm"] > 0
         assert line["direction_sigma_deg"] > 0
         assert line["dof"] > 0

@@ -59,8 +59,7 @@ def told(log, *looks: str) -> list[str]:
 
 
 EPSON = ("epson-sim", "epson-tcp")
-BACKENDS = (*EPSON, *plcs.LINKS)
-FEW = (*EPSON, *plcs.FEW_LINKS)
+FEW = (*EPSON, *plcs.few_links())
 
 
 @pytest.fixture(params=FEW)
@@ -90,7 +89,9 @@ def acts(on: Bench):
     return found
 
 
-@pytest.mark.parametrize("stopped", BACKENDS, indirect=True)
+@pytest.mark.parametrize(
+    "stopped", [*EPSON, *plcs.few_links("can-multicast", "opcua")], indirect=True
+)
 def test_nothing_that_acts_leaves_until_it_is_released(stopped):
     where, before = stopped.group.pose(), stopped.requests()
     for name, act in acts(stopped).items():
@@ -102,7 +103,7 @@ def test_nothing_that_acts_leaves_until_it_is_released(stopped):
     assert stopped.controller.outcomes.open_markers() == ()
 
 
-@pytest.mark.parametrize("stopped", BACKENDS, indirect=True)
+@pytest.mark.parametrize("stopped", [*EPSON, *plcs.few_links("modbus-tcp")], indirect=True)
 def test_after_the_release_and_a_reset_it_moves_again(stopped):
     controller, group = stopped.controller, stopped.group
     controller.reset_fault()
@@ -115,7 +116,7 @@ def test_after_the_release_and_a_reset_it_moves_again(stopped):
     assert group.pose().z_mm == pytest.approx(here.z_mm + 1, abs=0.2)
 
 
-@pytest.mark.parametrize("stopped", BACKENDS, indirect=True)
+@pytest.mark.parametrize("stopped", [*EPSON, *plcs.few_links("modbus-rtu")], indirect=True)
 def test_motors_off_and_another_stop_are_always_let_through(stopped):
     stopped.controller.stop()
     if type(stopped.controller).__name__ == "EpsonController":

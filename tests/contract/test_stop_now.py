@@ -22,7 +22,7 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.model import ControllerState, MotionProfile, Path, WorkBox
-from tests.contract._softmotion_cell import BACKENDS, LINKS, LINKS_BUT_OPCUA, SLOW, above
+from tests.contract._softmotion_cell import BACKENDS, LINKS, SLOW, above, few_links
 from tests.contract._softmotion_cell import served as served_plc
 
 CREEPING = MotionProfile(Path.STRAIGHT, 5, 1.0)
@@ -38,6 +38,19 @@ HABITS: tuple[dict[str, Any], ...] = (
 )
 
 
+HABITS_ON_LINKS = [
+    pytest.param(
+        link,
+        habits,
+        id=f"{link}-{habits}",
+        marks=pytest.mark.soak if habits and link != "sim" else (),
+    )
+    for habits in HABITS
+    for link in ("sim", "tcp", "pty")
+]
+"""Each habit is one of the controller, whatever link it is reached by."""
+
+
 def left_moving(cell, **options):
     """Begin a slow movement of 30 mm and drop its client, like a killed process."""
     controller = cell.connect(**options)
@@ -48,8 +61,8 @@ def left_moving(cell, **options):
     controller._link.session.close()
 
 
-@pytest.mark.on_serial
-@pytest.mark.parametrize("habits", HABITS, ids=str)
+@pytest.mark.on_every_link
+@pytest.mark.parametrize(("serve", "habits"), HABITS_ON_LINKS, indirect=["serve"])
 def test_a_movement_whose_client_died_is_brought_to_rest(serve, habits):
     simulator = EpsonSimulator(seed=7, options=EpsonOptions(**habits))
     with serve(simulator) as cell:
@@ -232,7 +245,11 @@ BUSY, NO_ANSWER_OF_THE_PLC = 6, 11
     [
         ("modbus-tcp", PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=BUSY)),
         ("modbus-tcp", PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=NO_ANSWER_OF_THE_PLC)),
-        ("modbus-rtu", PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=BUSY)),
+        pytest.param(
+            "modbus-rtu",
+            PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=BUSY),
+            marks=pytest.mark.soak,
+        ),
         pytest.param(
             "opcua", PlcFault(PlcFaultAction.OUT_OF_SERVICE), marks=pytest.mark.soak
         ),  # the server takes a second to come up
@@ -263,7 +280,7 @@ def test_looks_that_are_refused_for_a_moment_hold_no_stop_back():
         assert cell.simulator.faults.times_fired == 4
 
 
-@pytest.mark.parametrize("plc", LINKS_BUT_OPCUA, indirect=True)
+@pytest.mark.parametrize("plc", few_links("modbus-rtu"), indirect=True)
 def test_a_group_that_is_disabled_is_stopped_without_an_error(plc):
     with plc.connect() as controller:
         controller.motors(False)

@@ -165,15 +165,17 @@ def test_a_map_on_the_wrong_link_is_refused_by_name(server):
         robolink.connect(f"plc+modbus-tcp://127.0.0.1:1?map={ARRAYS.absolute()}")
 
 
-@pytest.mark.parametrize("bit", [0, 1])
 @pytest.mark.parametrize(
-    ("text", "action", "positions"),
+    ("text", "action", "positions", "bit"),
     [
-        (ARRAYS, "tear_array", (1, 3)),
-        (STRUCTURES, "tear_array", (1,)),
-        (SEPARATE, "tear_nodes", (1, 2)),
+        pytest.param(text, action, positions, bit, id=f"{name}-{bit}", marks=marks)
+        for name, text, action, positions, in_turn in (
+            ("arrays", ARRAYS, "tear_array", (1, 3), 0),
+            ("structures", STRUCTURES, "tear_array", (1,), 1),
+            ("separate", SEPARATE, "tear_nodes", (1, 2), 0),
+        )
+        for bit, marks in ((in_turn, ()), (1 - in_turn, pytest.mark.soak))
     ],
-    ids=["arrays", "structures", "separate"],
 )
 def test_a_torn_answer_is_no_value(server, text, action, positions, bit):
     """The program changes the tool between the two moments of the first or the second answer."""

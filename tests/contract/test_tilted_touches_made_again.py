@@ -45,7 +45,7 @@ SOURCES: dict[str, tuple[Any, WorldParameters, int]] = {
 
 
 APPROACHES = {"sphere-touch": Pose(53.4, 51.5, -30.0, 72.0)}
-EACH_TIME = ("six-point",)
+EACH_TIME = ("pivot",)
 
 
 @pytest.mark.parametrize(

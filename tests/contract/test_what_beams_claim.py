@@ -65,14 +65,6 @@ def test_a_needle_that_leans_is_corrected_for_it(lean_deg, turn_deg, seed):
     assert report.verification.max_drift_mm < 0.012
 
 
-def test_a_needle_that_stands_upright_is_told_to_lean_by_nothing():
-    report, off_mm = measured(sensor_cell, 4)
-    result = report.proposal.result
-    assert "needle_leans" not in result.notes
-    assert math.hypot(*result.lean.corrected_mm) < 0.003
-    assert within(report, off_mm) < 1.2
-
-
 @soak
 @pytest.mark.parametrize("turn_deg", [0.0, 180.0])
 def test_a_needle_that_leans_under_a_flange_upside_down_is_corrected_too(turn_deg):
@@ -154,6 +146,7 @@ def test_crossings_that_scatter_by_nothing_are_not_sure_to_nothing(make, speed_m
     result = report.proposal.result
     if make is plc_sensor_cell:
         assert result.interval_from == "resolution"
+        assert report.verification.max_drift_mm < 0.04
     assert min(result.half_width95) >= 0.0005
     assert within(report, off_mm) < 1.2
 

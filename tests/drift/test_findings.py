@@ -12,6 +12,7 @@ from robolink.drift.findings import mounted_trend
 from robolink.drift.history import LEVEL, likeliest_split, slope_of
 from robolink.errors import ConfigError
 from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
+from tests._rows import each_row
 from tests.drift._courses import course, found, steady
 
 # Findings in the history of a cell's tools, and what is none.
@@ -97,7 +98,7 @@ def test_fewer_than_twenty_changes_draw_no_limits():
         charts_of(jump, baseline=1)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@each_row("seed", range(40))
 def test_a_large_shift_is_said_after_four_changes_whatever_was_before(seed):
     """Earlier values that happened to lie on the same side do not belong to it."""
     slipped = course(seed, 29, shift=lambda index, _: (0.2 * (index >= 25), 0, 0))

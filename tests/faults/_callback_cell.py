@@ -1,7 +1,7 @@
 """A cell whose running program calls back: a simulated controller and a real server on a socket.
 
 Each question is passed on, and simulated time goes on only after its answer, so no wall clock
-decides anything. In a run that forks, the same process answers the questions.
+decides anything. In a run that is cut short, this process answers the questions itself.
 """
 
 import math

@@ -5,12 +5,16 @@ names the old tool, and ``recover`` restores it.
 """
 
 import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from typing import Final
 
 from robolink.model import EntryKind, ToolOffset
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
+from tests.faults._kills import kill
 from tests.faults._nozzle_cell import OF_A_CALIBRATION, numbers
-from tests.faults._recipe_instants import EVERYTHING, Instant
+from tests.faults._recipe_instants import EVERYTHING, Instant, Instants
 from tests.faults._requests import changes
 
 _EVERY: Final = 48
@@ -68,10 +72,37 @@ def words(cell: EpsonRecipeCell) -> tuple[str, ...]:
     return ("calibrate", "two-pose", "--tool", "1", "--yes", "--assist", cell.url)
 
 
-def meet(cell: EpsonRecipeCell) -> None:
-    """Load the modules that the commands of a check need, once for all of them."""
-    for command in (("status",), ("recover", "--yes")):
-        assert (done := cell.run(*command)).code == 0, done.err
+@contextmanager
+def begun() -> Iterator[EpsonRecipeCell]:
+    """Open the cell of a run."""
+    cell = EpsonRecipeCell((1,))
+    try:
+        yield cell
+    finally:
+        cell.close()
+
+
+def die(
+    words: Callable[[EpsonRecipeCell], Sequence[str]],
+    dies: Callable[[Instant], bool],
+    check: Callable[[EpsonRecipeCell, Sequence[str]], object],
+) -> None:
+    """Run a command, let it die at some of its instants, and check the leftovers."""
+    instants = Instants()
+    with begun() as cell:
+        ended = cell.run(*words(cell), instants=instants)
+        assert ended.code == 0, ended.err
+    dies_at = list(filter(dies, instants.passed))
+    print(f"{len(dies_at)} kill points of {len(instants.passed)}")  # noqa: T201 - for pytest -s
+    assert dies_at
+    for at in dies_at:
+        with begun() as cell:
+            command = words(cell)
+            kill(
+                lambda life: cell.run(*command, instants=life),  # noqa: B023 - called at once
+                at,
+                partial(check, cell, command),
+            )
 
 
 def check_killed(cell: EpsonRecipeCell) -> None:

@@ -15,8 +15,13 @@ from robolink_simulators.testkit.program_calls import AnsweredHere
 
 from robolink.journal.store.store import Store
 from tests.faults._callback_cell import IDENTITY, PROVED, CallbackCell, PowerCut
-from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, exchanges_and_commits
-from tests.faults._worlds import Worlds
+from tests.faults._recipe_instants import (
+    EVERYTHING,
+    Instant,
+    Instants,
+    exchanges_and_commits,
+    noted,
+)
 
 _MATTERS = ("rl_flag =", "TLSet n", "JUDGE", "KEPT,", "WROTE", "RlPutBack", "RESTORED,")
 _VERDICT = "JUDGE,"
@@ -42,7 +47,7 @@ class MortalCell:
 
     Args:
         kind: Measures with a pin, with beams, or with a camera.
-        folder: For the program, and for its end in each world.
+        folder: For the program.
         refused: Whether a touch of the turn test misses the pin.
     """
 
@@ -53,29 +58,10 @@ class MortalCell:
         if refused:
             cell.teach(22, PROVED[1:], off_mm=1.0)
         self._old = cell.tool
-        self._printed = ["touches_not_witnessed" if refused else "kept"]
-        self._begins = _VERDICT if refused else ""
-        self._ends = folder / "ends"
         self._dead = pytest.MonkeyPatch()
 
-    def lose(self, gone: str, *, everywhere: bool) -> set[str]:
-        """Lose it at its instants, or at a sample of them; return how the changes ended.
-
-        Until its verdict, a change that is refused is like one that is kept; the sample leaves its
-        statements before that out. Of the PC's transactions it has both moments in turn.
-        """
-        power = gone == "power"
-        worlds = Worlds(
-            Statements(everywhere, self._begins) if power else partial(_is_of_pc, everywhere),
-            self._cut_power if power else self._end_pc,
-        )
-        printed = worlds.explore_ends(lambda: self._run(worlds), self._check)
-        assert printed == self._printed
-        assert not worlds.told, worlds.told[0]
-        print(f"{gone}: {len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
-        return set(self._ends.read_text().split())
-
-    def _run(self, instants: Instants) -> list[str] | None:
+    def run(self, instants: Instants) -> list[str] | None:
+        """Run the program; return what it printed, if its controller lived."""
         cell = self.cell
         with exchanges_and_commits(cell.simulator, instants):
             cell.runner.on_statement = lambda _task, file, line, text: instants.pass_by(
@@ -89,11 +75,15 @@ class MortalCell:
                 return None
             finally:
                 cell.runner.on_statement = None
+                self._dead.undo()
 
-    def _cut_power(self, _at: Instant) -> None:
+    def cut_power(self) -> None:
+        """Let the controller go."""
         raise PowerCut
 
-    def _end_pc(self, _at: Instant) -> None:
+    def end_pc(self) -> None:
+        """Let the PC go."""
+
         @contextmanager
         def written(*_given, **_room):
             raise PcGone
@@ -102,18 +92,16 @@ class MortalCell:
         self._dead.setattr(Store, "write", written)
         raise PcGone
 
-    def _check(self, printed: list[str] | None) -> None:
+    def check(self, printed: list[str] | None) -> str:
+        """Check the leftovers, and go on; return whether the old value or the new one stands."""
         cell = self.cell
-        self._dead.undo()
         if printed is not None:
-            # A dead process holds no lease; in this world its process goes on.
+            # A dead process holds no lease; this one goes on.
             log = cell.journal.log(IDENTITY)
             log.take_over("the PC was switched off")
             log.close()
         cell.restore()
         whole = cell.require_whole(self._old)
-        with self._ends.open("a") as ends:
-            ends.write("new\n" if whole else "old\n")
         machine = cell.simulator.machine
         tools, held, by_hand = machine.tools, cell.tool, cell.simulator.world.tips[1]
         tools.set(1, by_hand)
@@ -124,6 +112,39 @@ class MortalCell:
         assert cell.run() == ["kept"]
         assert cell.open_markers() == []
         assert cell.journal.verify().problems == ()
+        return "new" if whole else "old"
+
+
+def lose(
+    begin: Callable[[], MortalCell], gone: str, *, everywhere: bool, refused: bool
+) -> set[str]:
+    """Lose controller or PC at its instants, or at a sample; return how the changes ended.
+
+    Until its verdict, a change that is refused is like one that is kept; the sample leaves its
+    statements before that out. Of the PC's transactions it has both moments in turn.
+
+    Args:
+        begin: Opens a cell.
+        gone: What is lost, "power" or "PC".
+        everywhere: Whether to lose it at each instant.
+        refused: Whether the undisturbed change is refused.
+    """
+    power, instants = gone == "power", Instants()
+    mortal = begin()
+    assert mortal.run(instants) == ["touches_not_witnessed" if refused else "kept"]
+    mortal.cell.close()
+    of_power = Statements(everywhere, _VERDICT if refused else "")
+    comes = of_power if power else partial(_is_of_pc, everywhere)
+    comes_at = list(filter(comes, instants.passed))
+    print(f"{gone}: {len(comes_at)} kill points of {len(instants.passed)}")  # noqa: T201 - for pytest -s
+    ends = set[str]()
+    for at in comes_at:
+        mortal = begin()
+        with noted(at):
+            printed = mortal.run(Instants(at, mortal.cut_power if power else mortal.end_pc))
+            ends.add(mortal.check(printed))
+        mortal.cell.close()
+    return ends
 
 
 def _is_of_pc(everywhere: bool, at: Instant) -> bool:

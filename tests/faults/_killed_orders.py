@@ -1,6 +1,7 @@
 """An order that is killed on its way, and delivered again until it is carried out."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -60,7 +61,7 @@ def words(cell: EpsonRecipeCell, folder: Path) -> list[str]:
     return ["change", str(recipe), "--order", ORDER, "--yes", "--json", "--assist", cell.url]
 
 
-def check_delivered_again(cell: EpsonRecipeCell, words: list[str]) -> None:
+def check_delivered_again(cell: EpsonRecipeCell, words: Sequence[str]) -> None:
     """The order of a killed change is carried out once, however often it is delivered."""
     cell.come_to_rest()
     if cell.open_markers():

@@ -13,8 +13,9 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.world import STORED
 from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.testkit import media
 
-from robolink.journal import open_journal
+from robolink.journal import Journal, memory_journal, open_journal
 from robolink.model import Marker, Secret, ToolOffset
 from tests._commands import Ended, run_command
 from tests.faults._client_process import ClientProcess
@@ -22,6 +23,9 @@ from tests.faults._requests import changes
 
 SPEED = 200.0
 """Simulated seconds per real second. The remote time-out is off: it would be 0.3 s."""
+
+STATE = "state"
+"""The state folder, in the folder of the cell."""
 
 FAST = (30, 40, 50)
 """The speed of the cell's own program, which a calibration must restore."""
@@ -45,7 +49,7 @@ class NozzleCell:
         self.url = url
         self.assist_url = assist_url
         self.folder = folder
-        self.state_folder = folder / "state"
+        self.state_folder = folder / STATE
         machine = simulator.machine
         machine.power_high, machine.parameters.speed = True, FAST
         self._settings = self._settings_now()
@@ -94,9 +98,14 @@ class NozzleCell:
         """The number of moves requested so far."""
         return sum(MOVE.match(text) is not None for text in self.requests)
 
+    @property
+    def journal(self) -> Journal:
+        """What is on record of it: in the state folder, or in the process that it ends with."""
+        return memory_journal(self.url) if self.url == self.assist_url else open_journal()
+
     def open_markers(self) -> tuple[Marker, ...]:
         """Return the markers that the command line counts as open."""
-        return open_journal().log(self.url).open_markers()
+        return self.journal.log(self.url).open_markers()
 
     def check_nothing_else_was_written(self) -> None:
         """Tool 1 holds the old or the measured value, written once at most; the rest is as
@@ -132,16 +141,27 @@ def served_cell(
     folder: Path, monkeypatch, *, speed: float = SPEED, password: str = "", **habits: Any
 ) -> Iterator[NozzleCell]:
     """Serve a cell; commands of this process share its state folder."""
-    folder.mkdir(parents=True)
-    options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
-    simulator = EpsonSimulator(seed=1, password=Secret(password), options=options)
+    simulator = _simulator(folder, monkeypatch, password, habits)
     clock = ScaledClock(speed)
     with ExitStack() as stack:
         tcp = stack.enter_context(serve_tcp(simulator, clock=clock))
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        cell = NozzleCell(simulator, tcp.url, assist.url, folder)
-        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(cell.state_folder))
-        yield cell
+        yield NozzleCell(simulator, tcp.url, assist.url, folder)
+
+
+@contextmanager
+def cell_in_process(folder: Path, monkeypatch) -> Iterator[NozzleCell]:
+    """The same cell without a socket: movements take no time, and only this process reaches it."""
+    simulator = _simulator(folder, monkeypatch, "", {})
+    with media.served(simulator, "sim") as url:
+        yield NozzleCell(simulator, url, url, folder)
+
+
+def _simulator(folder: Path, monkeypatch, password: str, habits: dict[str, Any]) -> EpsonSimulator:
+    folder.mkdir(parents=True)
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(folder / STATE))
+    options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
+    return EpsonSimulator(seed=1, password=Secret(password), options=options)
 
 
 def numbers(statement: str) -> list[float]:

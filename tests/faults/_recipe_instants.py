@@ -77,6 +77,16 @@ class Instants:
             self._act()
 
 
+@contextmanager
+def noted(at: object) -> Iterator[None]:
+    """Name an instant beside what is wrong after its disturbance."""
+    try:
+        yield
+    except AssertionError as error:
+        error.add_note(f"disturbed at {at}")
+        raise
+
+
 class WatchedClock(ManualClock):
     """A clock that reports when half of a wait is over."""
 

@@ -21,8 +21,7 @@ from tests.faults import _killed_calibrations as calibrations
 from tests.faults._client_process import ClientProcess
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._nozzle_cell import MOVE, OLD_TIP, served_cell
-from tests.faults._recipe_instants import EVERYTHING, Instant, Instants
-from tests.faults._worlds import Worlds
+from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, noted
 
 pytestmark = [pytest.mark.timeout(3600), pytest.mark.usefixtures("signals_of_a_terminal")]
 
@@ -34,12 +33,12 @@ WAYS = tuple(CODES)
 
 
 @pytest.fixture(scope="module")
-def last_pose():
-    """The number of the request after which the turn test is judged, in an undisturbed run."""
-    cell, whole = EpsonRecipeCell((1,)), Instants()
-    assert cell.run(*calibrations.words(cell), "--json", instants=whole).code == 0
-    cell.close()
-    return [at.number for at in whole.passed if at.kind == "request" and POSE in at.what][-1]
+def passed():
+    """The instants of an undisturbed run."""
+    whole = Instants()
+    with calibrations.begun() as cell:
+        assert cell.run(*calibrations.words(cell), "--json", instants=whole).code == 0
+    return whole.passed
 
 
 @dataclass
@@ -47,22 +46,26 @@ class Ending:
     """One of the ways to end a command, used once.
 
     Attributes:
+        at: The instant.
         begun: The number of movements begun by then, or requested just then.
         asked: The number of requests by then.
-        kind: The kind of instant.
     """
 
     cell: EpsonRecipeCell
-    way: signal.Signals = signal.SIGINT
+    at: Instant
     begun: int = -1
     asked: int = -1
-    kind: str = ""
 
-    def __call__(self, at: Instant) -> None:
+    @property
+    def way(self) -> signal.Signals:
+        """The signal."""
+        return WAYS[self.at.number % len(WAYS)]
+
+    def __call__(self) -> None:
         """Use it."""
-        self.kind, self.way = at.kind, WAYS[at.number % len(WAYS)]
-        self.begun = self.cell.moves_begun + (at.kind == "request")
+        self.begun = self.cell.moves_begun + (self.at.kind == "request")
         self.asked = len(self.cell.requests())
+        assert signal.getsignal(self.way) is not signal.SIG_DFL, "it would end this process"
         signal.raise_signal(self.way)
 
     def check(self, ended: Ended, last_pose: int) -> None:
@@ -84,7 +87,7 @@ class Ending:
         assert cell.open_markers() == (), ended.err
         kept = re.search("Tool 1 keeps the new value|The controller has stored tool 1", ended.err)
         # A transaction may lie on either side of the verdict, which follows the last pose.
-        assert self.kind == "commit" or bool(kept) is (self.asked > last_pose), ended.err
+        assert self.at.kind == "commit" or bool(kept) is (self.asked > last_pose), ended.err
         assert cell.changed() == ({1} if kept else set()), ended.err
         if writes == 2:
             assert "The old value of tool 1 is back" in ended.err
@@ -151,7 +154,7 @@ SHARES = 8
 """The instants are dealt to this many tests, so that several workers can share them."""
 EACH_TIME = (1, 3, 5, 6)
 """The shares of each run of the tests, with the write, both selections, login and logout among
-them, all in one run of the command; the others run only in ``make soak``.
+them; the others run only in ``make soak``.
 """
 OTHERS = [(share,) for share in range(SHARES) if EVERYTHING or share not in EACH_TIME]
 
@@ -164,19 +167,18 @@ OTHERS = [(share,) for share in range(SHARES) if EVERYTHING or share not in EACH
     else [EACH_TIME, *(pytest.param(other, marks=pytest.mark.soak) for other in OTHERS)],
     ids=str,
 )
-def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(last_pose, shares):
-    cell = EpsonRecipeCell((1,))
-    ending = Ending(cell)
+def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(passed, shares):
     dealt = calibrations.Dealt(*shares, shares=SHARES, every_commit=EVERY_COMMIT)
-    worlds = Worlds(dealt, ending)
-    ended = worlds.explore_ends(
-        lambda: cell.run(*calibrations.words(cell), "--json", instants=worlds),
-        lambda ended: ending.check(ended, last_pose),
-    )
-    cell.close()
-    assert ended.code == 0, ended.err
-    assert worlds.told == []
-    print(f"{len(worlds.came_at)} steps of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
+    steps = list(filter(dealt, passed))
+    # The turn test is judged after the last pose.
+    last_pose = [at.number for at in passed if at.kind == "request" and POSE in at.what][-1]
+    print(f"{len(steps)} steps of {len(passed)}")  # noqa: T201 - for pytest -s
+    assert steps
+    for at in steps:
+        with calibrations.begun() as cell, noted(at):
+            ending = Ending(cell, at)
+            ended = cell.run(*calibrations.words(cell), "--json", instants=Instants(at, ending))
+            ending.check(ended, last_pose)
 
 
 def test_ctrl_c_waits_for_the_outermost_of_two_operations():

@@ -1,11 +1,12 @@
 """A program killed anywhere: the value is old or tested, doubts are reported, recover ends them.
 
-Each act is a row. Its program runs once against a simulator of this process and dies at its
-instants: before a request is carried out (which it is all the same), before an answer leaves, and
-before and after each durable transaction of the journal; a controller's own program dies before its
-statements. By default a sample is used: the transactions, and the requests that log in or out,
-select, start or write; of a change ``make test`` uses a third of them, and ``make soak`` the others
-too. ``ROBOLINK_ALL_KILL_POINTS=1`` uses all; ``pytest -s`` shows how many.
+Each act is a row. Its program runs against a simulator of this process, once to its end and once up
+to each of its instants, where it dies: before a request is carried out (which it is all the same),
+before an answer leaves, and before and after each durable transaction of the journal; a
+controller's own program dies before its statements. By default a sample is used: the transactions,
+and the requests that log in or out, select, start or write; of a change ``make test`` uses a third
+of them, and ``make soak`` the others too. ``ROBOLINK_ALL_KILL_POINTS=1`` uses all; ``pytest -s``
+shows how many.
 
 Four instants on each kind of line show that a real process dies like that: SIGKILL before and after
 the write of a tool, and before and after the transaction that ends it is durable. There
@@ -26,20 +27,19 @@ from tests.faults import _killed_orders as orders
 from tests.faults import _killed_restores as restores
 from tests.faults._callback_cell import CallbackCell
 from tests.faults._callback_sensors import BeamCell, CameraCell, RoundCell
-from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
+from tests.faults._change_cell import ChangeCell, EpsonChangeCell, Step, WireStep, change_cell
 from tests.faults._change_process import NEW, OLD, CommitStep
-from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._kill_points import (
     NOTHING_LEFT,
     check_killed_change,
     check_recovered,
     check_recovers,
 )
-from tests.faults._killed_callbacks import MortalCell
+from tests.faults._killed_callbacks import MortalCell, lose
+from tests.faults._kills import kill
 from tests.faults._mapped_change_cell import mapped_change_cell
-from tests.faults._recipe_instants import EVERYTHING, Instant
+from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, noted
 from tests.faults._softmotion_change_cell import plc_change_cell
-from tests.faults._worlds import Worlds
 
 pytestmark = pytest.mark.timeout(3600)
 
@@ -70,20 +70,20 @@ class Sample:
     """
 
     def __init__(
-        self, matters: Callable[[Instant], bool], *, every: int = 1, first: int = 1
+        self, matters: Callable[[ChangeCell, Instant], bool], *, every: int = 1, first: int = 1
     ) -> None:
         self._matters = matters
         self._every = every
         self._first = first
         self._seen = 0
 
-    def __call__(self, at: Instant) -> bool:
+    def __call__(self, cell: ChangeCell, at: Instant) -> bool:
         """Whether the program dies there."""
         if at.kind not in ("request", "answer", "commit"):
             return False
         if EVERYTHING:
             return True
-        self._seen += (matters := self._matters(at))
+        self._seen += (matters := self._matters(cell, at))
         return matters and self._seen % self._every == self._first % self._every
 
 
@@ -91,12 +91,53 @@ def matters_to(cell: ChangeCell, at: Instant) -> bool:
     return at.kind == "commit" or cell.matters.match(at.what) is not None
 
 
-def die(cell: ChangeCell, program: str, sample: Sample, check: Callable[[], None]) -> None:
-    """Run a program, let it die at the instants of a sample, and check the leftovers."""
-    worlds = Worlds(sample)
-    worlds.explore(lambda: cell.run(program, worlds), check)
-    assert worlds.told == []
-    print(f"{program}: {len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
+World = Callable[[Path, Callable[[ChangeCell], object]], object]
+"""Opens a cell in a folder, and does something there."""
+
+
+def fresh(kind: str) -> World:
+    def act(folder: Path, there: Callable[[ChangeCell], object]) -> None:
+        with KINDS[kind](folder) as cell:
+            there(cell)
+
+    return act
+
+
+def die(
+    world: World,
+    folder: Path,
+    program: str,
+    sample: Sample,
+    check: Callable[[ChangeCell], object],
+    *,
+    whole: Callable[[ChangeCell], object],
+) -> None:
+    """Run a program, let it die at the instants of a sample, and check the leftovers.
+
+    Args:
+        world: Where a run begins.
+        folder: The folder for those of the cells.
+        program: The program.
+        sample: Chooses the instants.
+        check: The conditions after a death.
+        whole: Those after the undisturbed run.
+    """
+    instants, dies_at = Instants(), list[Instant]()
+
+    def run(cell: ChangeCell) -> None:
+        cell.run(program, instants)
+        dies_at.extend(at for at in instants.passed if sample(cell, at))
+        whole(cell)
+
+    world(folder / "whole", run)
+    print(f"{program}: {len(dies_at)} kill points of {len(instants.passed)}")  # noqa: T201 - for pytest -s
+    assert dies_at
+
+    def death(at: Instant) -> Callable[[ChangeCell], None]:
+        return lambda cell: kill(partial(cell.run, program), at, partial(check, cell))
+
+    for number, at in enumerate(dies_at):
+        world(folder / str(number), death(at))
 
 
 PHASES: Final = {"EPSON": 1, "PLC": 2, "register map": 3}
@@ -121,12 +162,13 @@ PHASES: Final = {"EPSON": 1, "PLC": 2, "register map": 3}
 )
 @pytest.mark.fault("F57", "F58")
 def test_f57_f58_a_change_killed_anywhere_is_recovered_as_a_whole(tmp_path, kind, program, every):
-    with KINDS[kind](tmp_path / "cell") as cell:
-        assert NOTHING_LEFT in cell.recover()
-        sample = Sample(partial(matters_to, cell), every=every, first=PHASES[kind])
-        die(cell, program, sample, partial(check_killed_change, cell, program))
+    def whole(cell: ChangeCell) -> None:
         assert cell.tools == (NEW if program != "one tool" else {**OLD, 1: NEW[1]})
         assert NOTHING_LEFT in cell.recover()
+
+    sample = Sample(matters_to, every=every, first=PHASES[kind])
+    check = partial(check_killed_change, program=program)
+    die(fresh(kind), tmp_path, program, sample, check, whole=whole)
 
 
 # The instants at which a change is killed, and then its recovery: before the first answer of the
@@ -167,26 +209,28 @@ class Left:
 @pytest.mark.fault("F80")
 def test_f80_a_recovery_killed_anywhere_may_be_run_again(tmp_path, left):
     kind, program, *path, expected = LEFT[left]
-    with KINDS[kind](tmp_path / "cell") as cell:
-        assert NOTHING_LEFT in cell.recover()
+    instants = Instants()
+    fresh(kind)(tmp_path / "undisturbed", lambda cell: cell.run(program, instants))
+    at = next(filter(Left(*path), instants.passed))
 
-        def recover() -> None:
+    def world(folder: Path, there: Callable[[ChangeCell], object]) -> None:
+        def left_there(cell: ChangeCell) -> None:
             cell.act()
-            written = cell.writes()
-            assert written == expected
-            sample = Sample(partial(matters_to, cell), every=5)
-            die(cell, "recover", sample, partial(check_killed_recovery, cell, program, written))
-            check_recovered(cell, program, written)
+            assert cell.writes() == expected
+            there(cell)
 
-        worlds = Worlds(Left(*path))
-        worlds.explore(lambda: cell.run(program, worlds), recover)
-        assert worlds.told == []
-        assert len(worlds.came_at) == 1
+        fresh(kind)(
+            folder, lambda cell: kill(partial(cell.run, program), at, partial(left_there, cell))
+        )
 
+    def check(cell: ChangeCell) -> None:
+        cell.act()
+        check_recovers(cell, program, expected)
 
-def check_killed_recovery(cell: ChangeCell, program: str, written: list[int]) -> None:
-    cell.act()
-    check_recovers(cell, program, written)
+    def whole(cell: ChangeCell) -> None:
+        check_recovered(cell, program, expected)
+
+    die(world, tmp_path, "recover", Sample(matters_to, every=5), check, whole=whole)
 
 
 @pytest.mark.parametrize("kind", ["EPSON", "PLC"])
@@ -202,29 +246,36 @@ def check_killed_recovery(cell: ChangeCell, program: str, written: list[int]) ->
 def test_f79_an_order_killed_anywhere_and_delivered_again_is_carried_out_once(
     tmp_path, kind, program, whole
 ):
-    with KINDS[kind](tmp_path / "cell") as cell:
-        assert NOTHING_LEFT in cell.recover()
-        sample = Sample(lambda at: whole or matters_to(cell, at), every=1 if whole else 4)
-        die(cell, program, sample, partial(orders.check_killed_order, cell, program))
+    sample = Sample(lambda cell, at: whole or matters_to(cell, at), every=1 if whole else 4)
+    check = partial(orders.check_killed_order, program=program)
+    die(fresh(kind), tmp_path, program, sample, check, whole=ChangeCell.check_all_is_settled)
 
 
 @pytest.mark.parametrize("kind", [pytest.param("EPSON", marks=SOAK), "PLC"])
 @pytest.mark.fault("F57")
 def test_f57_a_restore_killed_anywhere_keeps_what_is_done_and_is_ended_by_another(tmp_path, kind):
-    with KINDS[kind](tmp_path / "cell") as cell:
-        assert NOTHING_LEFT in cell.recover()
-        sample = Sample(partial(matters_to, cell), every=3)
-        die(cell, "restore", sample, partial(restores.check_killed_restore, cell))
+    def whole(cell: ChangeCell) -> None:
         assert restores.stage(cell) == restores.STAGES[-1]
+
+    sample = Sample(matters_to, every=3)
+    die(fresh(kind), tmp_path, "restore", sample, restores.check_killed_restore, whole=whole)
 
 
 def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):
-    with change_cell(tmp_path / "cell", wire="sim") as cell:
-        assert NOTHING_LEFT in cell.recover()
-        looks.furnish(cell)
-        sample = Sample(lambda at: at.what.startswith("$Start"))
-        die(cell, "look", sample, partial(looks.check_killed_look, cell))
+    def world(folder: Path, there: Callable[[ChangeCell], object]) -> None:
+        with change_cell(folder, wire="sim") as cell:
+            looks.furnish(cell)
+            there(cell)
+
+    def whole(cell: ChangeCell) -> None:
         assert (cell.tools, cell.selected) == (OLD, 1)
+
+    def check(cell: ChangeCell) -> None:
+        assert isinstance(cell, EpsonChangeCell)
+        looks.check_killed_look(cell)
+
+    sample = Sample(lambda _cell, at: at.what.startswith("$Start"))
+    die(world, tmp_path, "look", sample, check, whole=whole)
 
 
 @pytest.mark.parametrize(
@@ -249,9 +300,8 @@ def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):
 def test_f57_f58_a_change_by_the_controller_s_own_program_is_proved_or_was_never(
     tmp_path, kind, gone, everywhere
 ):
-    cell = MortalCell(kind, tmp_path)
-    assert cell.lose(gone, everywhere=everywhere) == {"old", "new"}
-    cell.cell.close()
+    begin = partial(MortalCell, kind, tmp_path)
+    assert lose(begin, gone, everywhere=everywhere, refused=False) == {"old", "new"}
 
 
 @pytest.mark.parametrize(
@@ -266,9 +316,8 @@ def test_f57_f58_a_change_by_the_controller_s_own_program_is_proved_or_was_never
 def test_f58_a_value_that_was_refused_is_put_back_whatever_is_gone_meanwhile(
     tmp_path, gone, everywhere
 ):
-    cell = MortalCell(CallbackCell, tmp_path, refused=True)
-    assert cell.lose(gone, everywhere=everywhere) == {"old"}
-    cell.cell.close()
+    begin = partial(MortalCell, CallbackCell, tmp_path, refused=True)
+    assert lose(begin, gone, everywhere=everywhere, refused=True) == {"old"}
 
 
 CALIBRATION_SHARES: Final = 4 if EVERYTHING else 1
@@ -278,17 +327,11 @@ CALIBRATION_SHARES: Final = 4 if EVERYTHING else 1
 @pytest.mark.parametrize("share", range(CALIBRATION_SHARES))
 @pytest.mark.fault("F60")
 def test_f60_a_calibration_killed_anywhere_leaves_the_old_or_the_new_value(share):
-    cell = EpsonRecipeCell((1,))
-    worlds = Worlds(calibrations.Dealt(share, shares=CALIBRATION_SHARES))
-    calibrations.meet(cell)
-    ended = worlds.explore(
-        lambda: cell.run(*calibrations.words(cell), instants=worlds),
-        partial(calibrations.check_killed, cell),
+    calibrations.die(
+        calibrations.words,
+        calibrations.Dealt(share, shares=CALIBRATION_SHARES),
+        lambda cell, _words: calibrations.check_killed(cell),
     )
-    cell.close()
-    assert ended.code == 0, ended.err
-    assert worlds.told == []
-    print(f"calibrate: {len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
 
 
 ORDER_SHARES: Final = 16
@@ -311,19 +354,11 @@ def at_the_write(at: Instant) -> bool:
 )
 @pytest.mark.fault("F79")
 def test_f79_a_change_killed_anywhere_and_delivered_again_is_made_once(tmp_path, dies):
-    cell = EpsonRecipeCell((1,))
-    words = orders.words(cell, tmp_path)
-    worlds = Worlds(lambda at: at.kind in ("request", "answer", "commit") and dies(at))
-    calibrations.meet(cell)
-    ended = worlds.explore(
-        lambda: cell.run(*words, instants=worlds),
-        partial(orders.check_delivered_again, cell, words),
+    calibrations.die(
+        partial(orders.words, folder=tmp_path),
+        lambda at: at.kind in ("request", "answer", "commit") and dies(at),
+        orders.check_delivered_again,
     )
-    cell.close()
-    assert ended.code == 0, ended.err
-    assert worlds.came_at
-    assert worlds.told == []
-    print(f"{len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
 
 
 LEFT_TO_SOAK: Final = ("RTU", "CANopen", "OPC UA", "register map over Modbus TCP")
@@ -347,10 +382,6 @@ def test_f57_f58_a_process_killed_at_four_instants_is_recovered_on_every_line(tm
         assert cell.tools == {**OLD, 1: NEW[1]}
     assert len(steps) == 4
     for number, step in enumerate(steps):
-        with LINES[line](tmp_path / str(number)) as cell:
+        with LINES[line](tmp_path / str(number)) as cell, noted(step):
             cell.kill("one tool", step)
-            try:
-                check_killed_change(cell, "one tool")
-            except AssertionError as error:
-                error.add_note(f"killed at {step}")
-                raise
+            check_killed_change(cell, "one tool")

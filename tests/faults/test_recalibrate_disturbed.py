@@ -11,7 +11,7 @@ inner ones of rows of polls. ``pytest -s`` shows how many.
 """
 
 import re
-from typing import Any, Final
+from typing import Final
 
 import pytest
 
@@ -23,8 +23,14 @@ from tests.faults._recipe_ends import (
     check_put_right,
     check_stopped,
 )
-from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, chosen, without_inner_polls
-from tests.faults._worlds import Worlds
+from tests.faults._recipe_instants import (
+    EVERYTHING,
+    Instant,
+    Instants,
+    chosen,
+    noted,
+    without_inner_polls,
+)
 
 pytestmark = pytest.mark.timeout(7200)
 
@@ -36,17 +42,15 @@ EACH_TIME: Final[dict[str, tuple[str, ...]]] = {
     "EPSON, two tools": (CTRL_C, "e-stop", "guard"),
     "PLC, one tool": (CTRL_C, "e-stop", "drive fault", "permit"),
 }
-"""Each disturbance on each kind; the same of the other number of tools runs only in soak.
-
-One run of a recipe serves all its disturbances, each at instants of its own.
-"""
-ROWS: Final[list[Any]] = [
-    pytest.param(name, (how,), marks=() if EVERYTHING else pytest.mark.soak)
+"""Each disturbance on each kind; the same of the other number of tools runs only in soak."""
+ROWS: Final = [
+    pytest.param(
+        name,
+        how,
+        marks=() if EVERYTHING or how in EACH_TIME.get(name, ()) else pytest.mark.soak,
+    )
     for name, how in TESTS
-    if EVERYTHING or how not in EACH_TIME.get(name, ())
 ]
-if not EVERYTHING:
-    ROWS.extend(EACH_TIME.items())
 MATTERS: Final = re.compile(
     r'\$(SetIO|Execute,"(Tool \d|TLSet \d))|write_command (SELECT|WRITE|OWNER)|[A-Z]'
 )
@@ -83,14 +87,14 @@ def instants(tmp_path_factory):
     return of
 
 
-def check(worlds: Worlds, disturbance: Disturbance, ended: Ended) -> None:
+def check(disturbance: Disturbance, ended: Ended, at: Instant) -> None:
     cell = disturbance.cell
     assert disturbance.came, "the instant was not reached"
     if disturbance.how == CTRL_C:
         check_interrupted(cell, ended, disturbance)
     else:
         check_stopped(cell, ended, disturbance)
-        check_put_right(cell, disturbance, offered=bool(worlds.came_at[-1].number % 2))
+        check_put_right(cell, disturbance, offered=bool(at.number % 2))
 
 
 def steps_of(name: str, how: str, whole: list[Instant]) -> list[Instant]:
@@ -105,26 +109,13 @@ def steps_of(name: str, how: str, whole: list[Instant]) -> list[Instant]:
 
 
 @pytest.mark.fault("F21", "F22", "F24")
-@pytest.mark.parametrize(("name", "hows"), ROWS, ids=str)
+@pytest.mark.parametrize(("name", "how"), ROWS)
 def test_f21_f22_f24_a_disturbed_run_leaves_all_or_nothing_and_says_what(
-    tmp_path, instants, name, hows
+    tmp_path, instants, name, how
 ):
-    case, whole = CASES[name], instants(name)
-    due = [(step, how) for how in hows for step in steps_of(name, how, whole)]
-    with case.cell() as cell:
-        disturbances = {how: Disturbance(cell, how) for how in hows}
-
-        def due_at(at: Instant) -> list[str]:
-            return [how for step, how in due if (step.kind, step.number) == (at.kind, at.number)]
-
-        def this_one() -> Disturbance:
-            at = worlds.came_at[-1]
-            return disturbances[due_at(at)[worlds.came_at.count(at) - 1]]
-
-        worlds = Worlds(lambda at: len(due_at(at)), lambda _at: this_one()())
-        ended = worlds.explore_ends(
-            lambda: case.run(cell, tmp_path, worlds), lambda ended: check(worlds, this_one(), ended)
-        )
-    assert ended.code == 0, ended.err
-    assert worlds.told == []
-    assert len(worlds.came_at) == len(due)
+    case = CASES[name]
+    for at in steps_of(name, how, instants(name)):
+        with case.cell() as cell, noted(at):
+            disturbance = Disturbance(cell, how)
+            ended = case.run(cell, tmp_path, Instants(at, disturbance))
+            check(disturbance, ended, at)

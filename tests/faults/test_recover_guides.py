@@ -2,7 +2,7 @@
 
 import json
 import re
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 
 import pytest
 from robolink_cli.prompts.current_desk import sitting_at
@@ -19,9 +19,9 @@ TURNED = re.compile(r'\$Execute,"Go XY')
 WRITTEN = re.compile(r'\$Execute,"TLSet 1, XY')
 
 
-@pytest.fixture
-def cell(tmp_path):
-    """A cell whose link was cut during the turn of tool 1's turn test."""
+@contextmanager
+def cut_off(folder):
+    """Open a cell whose link was cut during the turn of tool 1's turn test."""
     command = COMMANDS["EPSON: recalibrate"]
     with command.case.cell() as cell:
         assert isinstance(cell, EpsonRecipeCell)
@@ -36,7 +36,7 @@ def cell(tmp_path):
                 cut.append("gone")
                 panel.cut_link()
 
-        recipe = tmp_path / "recipe.toml"
+        recipe = folder / "recipe.toml"
         recipe.write_text(command.case.recipe)
         words = [word.format(recipe=recipe, assist=cell.url) for word in command.words]
         with pytest.MonkeyPatch.context() as patch:
@@ -45,6 +45,12 @@ def cell(tmp_path):
         assert cut[-1] == "gone"
         cell.clock.sleep(60.0)  # the movement goes on without its client, and ends
         assert (ended.code, cell.changed()) == (6, {1}), ended.err
+        yield cell
+
+
+@pytest.fixture
+def cell(tmp_path):
+    with cut_off(tmp_path) as cell:
         yield cell
 
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -13,10 +14,10 @@ from robolink_simulators.control.assist import open_eyes
 
 from robolink.model import EntryKind, MarkerKind
 from tests.faults import _recipe_instants
+from tests.faults._kills import kill
 from tests.faults._recipe_instants import EVERYTHING, Instants
 from tests.faults._what_stands import COMMANDS, Disturbed
-from tests.faults._worlds import Worlds
-from tests.faults.test_recover_guides import cell, kinds
+from tests.faults.test_recover_guides import cell, cut_off, kinds
 
 __all__ = ["cell"]
 
@@ -89,13 +90,23 @@ class Desk(_operator.AssistedOperator):
         return "2" if len(self.asked) == 1 else super().poll(wait_s)
 
 
-def killed_at(cell, dies, check):
-    """Let the turn test's program die at the given instant, and check the leftovers."""
-    assert cell.run("recover", "--dry-run").code == 6
-    worlds = Worlds(lambda at: dies(at, worlds.passed))
-    worlds.explore(lambda: new_chosen(cell, instants=worlds), check)
-    assert worlds.came_at
-    assert worlds.told == []
+def killed_at(folder, dies, check):
+    """Let the turn test's program die at instants of a whole run, and check the leftovers."""
+    whole = Instants()
+    with left_open(folder) as cell:
+        new_chosen(cell, instants=whole)
+    dies_at = dies(whole.passed)
+    assert dies_at
+    for at in dies_at:
+        with left_open(folder) as cell:
+            kill(lambda life: new_chosen(cell, instants=life), at, partial(check, cell))
+
+
+@contextmanager
+def left_open(folder):
+    with cut_off(folder) as cell:
+        assert cell.run("recover", "--dry-run").code == 6
+        yield cell
 
 
 def verified(cell):
@@ -108,19 +119,16 @@ def moves_asked(passed):
     return sum(bool(MOVED.match(one.what)) for one in passed if one.kind == "request")
 
 
-def coming_down(at, passed):
-    """The middle of the robot's first own descent to the pin."""
+def coming_down(passed):
+    """Return the middle of the robot's first own descent to the pin, if it has come."""
     downs = [one for one in passed if one.kind == "request" and "Move XY" in one.what]
-    waits = (
-        [one for one in passed[passed.index(downs[4]) :] if one.kind == "wait"] if downs[4:] else []
-    )
-    return waits == [at]
+    after = passed[passed.index(downs[4]) :] if downs[4:] else []
+    return [one for one in after if one.kind == "wait"][:1]
 
 
-def test_killed_in_the_turn_test_nothing_is_lost_and_the_next_one_keeps_the_value(cell):
-    new = cell.tools()[1]
-
-    def check():
+def test_killed_in_the_turn_test_nothing_is_lost_and_the_next_one_keeps_the_value(tmp_path):
+    def check(cell):
+        new = cell.tools()[1]
         cell.come_to_rest()
         assert MarkerKind.CHANGE in kinds(cell)
         assert verified(cell) == []
@@ -138,7 +146,7 @@ def test_killed_in_the_turn_test_nothing_is_lost_and_the_next_one_keeps_the_valu
         assert (cell.open_markers(), cell.selected, verified(cell)) == ((), 1, [True])
         assert cell.settings() == cell.settings_before
 
-    killed_at(cell, coming_down, check)
+    killed_at(tmp_path, coming_down, check)
 
 
 def test_a_tip_that_is_elsewhere_gets_the_old_value_back_with_one_write(cell):
@@ -203,7 +211,7 @@ def test_what_stops_the_robot_in_the_test_leaves_no_unproved_value_in_use(cell, 
     class Presses(Instants):
         def pass_by(self, kind, what=""):
             super().pass_by(kind, what)
-            if not pressed and coming_down(self.passed[-1], self.passed):
+            if not pressed and coming_down(self.passed):
                 pressed.append(moves_asked(self.passed))
                 cell.disturb(how)
 
@@ -222,8 +230,8 @@ def test_what_stops_the_robot_in_the_test_leaves_no_unproved_value_in_use(cell, 
 
 
 @pytest.mark.soak
-def test_killed_anywhere_in_it_the_change_is_open_or_proved(cell):
-    def check():
+def test_killed_anywhere_in_it_the_change_is_open_or_proved(tmp_path):
+    def check(cell):
         cell.come_to_rest()
         assert cell.changed() == {1}
         if MarkerKind.CHANGE not in kinds(cell):
@@ -235,11 +243,12 @@ def test_killed_anywhere_in_it_the_change_is_open_or_proved(cell):
         assert (cell.changed(), cell.open_markers(), verified(cell)[-1]) == ({1}, (), True)
         assert len(cell.writes()) == written
 
-    def dies(at, _passed):
+    def dies(passed):
         every = 1 if EVERYTHING else EVERY_ANSWER
-        return at.kind == "commit" or (at.kind == "answer" and at.number % every == 2 % every)
+        answers = [at for at in passed if at.kind == "answer" and at.number % every == 2 % every]
+        return answers + [at for at in passed if at.kind == "commit"]
 
-    killed_at(cell, dies, check)
+    killed_at(tmp_path, dies, check)
 
 
 def test_off_a_terminal_the_new_value_is_kept_on_a_word_and_nothing_moves(cell):
@@ -272,7 +281,7 @@ def test_a_group_of_axes_is_tested_too(tmp_path):
     [
         ({}, 1, "The old value of tool 1 is back."),
         ({5: "3"}, 1, "Start again and measure the tip anew."),
-        pytest.param({5: "2"}, 2, "up to 0.0", marks=pytest.mark.soak),
+        pytest.param({5: "2"}, 2, "made 2 times", marks=pytest.mark.soak),
     ],
     ids=["ENTER", "mount", "once more"],
 )

@@ -6,7 +6,6 @@ Rows F59 and F60 of the catalogue.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import count
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
@@ -21,8 +20,9 @@ from robolink.transaction import recover
 from tests.contract._softmotion_cell import served
 from tests.faults import _killed_calibrations as calibrations
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
+from tests.faults._kills import kill
 from tests.faults._nozzle_cell import MOVE
-from tests.faults._worlds import Worlds
+from tests.faults._recipe_instants import Instants
 
 NEW = ToolOffset(12.25, -3.5, -20.0)
 THIRD = ToolOffset(15.5, 1.25, -21.0)
@@ -103,22 +103,18 @@ def test_f59_a_third_value_is_a_conflict_that_blocks_motion_until_a_person_decid
 @pytest.mark.soak
 @pytest.mark.fault("F60")
 def test_f60_a_calibration_that_was_cut_short_begins_again_at_its_first_step():
-    whole = EpsonRecipeCell((1,))
-    assert whole.run(*calibrations.words(whole)).code == 0
-    touches = touches_of(whole)
-    whole.close()
-    cell, answered = EpsonRecipeCell((1,)), count(1)
-    calibrations.meet(cell)
-    worlds = Worlds(
-        lambda at: at.kind == "answer" and bool(MOVE.match(at.what)) and next(answered) == 5
-    )
-    worlds.explore(
-        lambda: cell.run(*calibrations.words(cell), instants=worlds),
-        lambda: check_begins_again(cell, touches),
-    )
-    cell.close()
-    assert len(worlds.came_at) == 1
-    assert worlds.told == []
+    whole = Instants()
+    with calibrations.begun() as cell:
+        assert cell.run(*calibrations.words(cell), instants=whole).code == 0
+        touches = touches_of(cell)
+    moved = [at for at in whole.passed if at.kind == "answer" and MOVE.match(at.what)]
+    with calibrations.begun() as cell:
+        words = calibrations.words(cell)
+        kill(
+            lambda life: cell.run(*words, instants=life),
+            moved[4],
+            lambda: check_begins_again(cell, touches),
+        )
 
 
 def check_begins_again(cell: EpsonRecipeCell, touches: list[int]) -> None:

@@ -70,8 +70,10 @@ def test_a_second_terminal_stops_through_the_one_that_is_logged_in(epson, beside
 def test_a_second_terminal_stops_a_plc_itself(plc, beside, capsys):
     simulator, url = plc
     group = simulator.plc.group
+    began_mm = group.flange().shift_mm[0]
     process = beside("-c", url, "jog", "x-5", "--speed", "1", "--yes")
-    await_that(lambda: group.movements_started > 0, process)
+    # A client that has not seen its movement acknowledged knows no more than that it may move.
+    await_that(lambda: group.flange().shift_mm[0] < began_mm - 0.5, process)
     assert entry.run(["-c", url.replace("127.0.0.1", "localhost"), "stop"]) == 0
     assert "has stopped" in capsys.readouterr().out
     assert process.exit_code() == 10

@@ -25,6 +25,7 @@ from robolink.protocols.epson_text import (
     parse_status,
 )
 from robolink.transport import parse_url
+from tests._rows import each_row
 from tests.fuzz._mutating import edited_bytes, fuzzed
 from tests.unit.conftest import Client
 from tests.unit.test_spel_statements import before, rows
@@ -204,7 +205,7 @@ def test_the_driver_claims_nothing_that_is_not_so_whatever_is_answered(data, at)
 LONG = "7" * 5000
 
 
-@pytest.mark.parametrize("text", [*PRINTED, "00100000001,4002"])
+@each_row("text", [*PRINTED, "00100000001,4002"])
 def test_a_number_of_thousands_of_digits_is_no_number(text):
     """Python refuses to read one, with an error that is not ours."""
     for digits in re.finditer(r"\d+", text):
@@ -214,7 +215,7 @@ def test_a_number_of_thousands_of_digits_is_no_number(text):
                 parse(longer)
 
 
-@pytest.mark.parametrize("answer", ["!Execute,99", "#GetStatus,00100000001,0000", "#GetIO,1"])
+@each_row("answer", ["!Execute,99", "#GetStatus,00100000001,0000", "#GetIO,1"])
 def test_an_answer_with_a_number_of_thousands_of_digits_is_refused(answer):
     head, _, _ = answer.rpartition(",")
     events_of(EpsonTextCodec(Role.HOST), f"{head},{LONG}\r\n".encode())

@@ -27,6 +27,7 @@ from robolink.protocols.mailbox import (
     encode_response,
     encode_slot,
 )
+from tests._rows import each_row
 from tests.fuzz._mutating import LREALS, WORDS, edited_words, fuzzed, sealed
 from tests.unit._mailbox_client import linked, owning
 from tests.unit.softmotion_driver._cell import Cell
@@ -86,7 +87,7 @@ def test_a_device_number_is_decoded_or_refused(words):
         assert number is None or 0 < number < 2**32
 
 
-@pytest.mark.parametrize("length", [0, 1, 63, 64, 65, 111, 112, 113])
+@each_row("length", [0, 1, 63, 64, 65, 111, 112, 113])
 def test_a_block_of_another_length_is_refused(length):
     for decode, own in ((decode_response, 112), (decode_slot, 36), (decode_command, 64)):
         if length != own:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.spel.source_text import ProgramRefused
 
+from tests._rows import each_row
 from tests.fuzz._mutating import fuzzed
 
 LONGEST_S = 5.0
@@ -176,7 +177,7 @@ BOMBS = {
 }
 
 
-@pytest.mark.parametrize(("text", "told"), BOMBS.values(), ids=list(BOMBS))
+@each_row(("text", "told"), BOMBS.values())
 def test_what_would_fill_the_memory_is_refused(text, told):
     faults = judged(text, {"a.inc": '#include "a.inc"\n' * 9})
     assert any(told in fault for fault in faults) if told else not faults

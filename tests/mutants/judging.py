@@ -152,8 +152,12 @@ class Copy:
         return Judgement(by="neither", asked=len(asked), passed=passed, cpu_s=round(spent_s, 2))
 
     def _is_sound(self, test: str, part: list[str]) -> bool:
-        """Return whether the failed test passes without the mutant, after the same tests."""
-        before = tuple(part[: part.index(test) + 1] if test in part else [test])
+        """Return whether the failed test passes without the mutant, after the same tests.
+
+        What cannot even be imported is a module: then it is whether those of its tests pass.
+        """
+        of_module = [one for one in part if one.partition("::")[0] == test]
+        before = tuple(part[: part.index(test) + 1] if test in part else of_module or [test])
         if before not in self._sound:
             told = self._ask("tests", cpu_s=MOST_CPU_S, tests=list(before))
             self._sound[before] = told["how"] == "passed"

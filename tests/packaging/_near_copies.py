@@ -55,12 +55,14 @@ def reviewed() -> set[Pair]:
 def _with_common_words(group):
     """Yield the pairs that share two neighbouring words, as six words of which two differ do."""
     places = defaultdict(list)
+    told = [set(words) for _, words in group]
     for number, (_, words) in enumerate(group):
         for two in set(pairwise(words)):
             places[two].append(number)
     seen = {pair for numbers in places.values() for pair in combinations(numbers, 2)}
     for one, other in seen:
-        if abs(len(group[one][1]) - len(group[other][1])) <= MOST:
+        (_, some), (_, others) = group[one], group[other]
+        if abs(len(some) - len(others)) <= MOST and len(told[one] - told[other]) <= MOST:
             yield group[one], group[other]
 
 

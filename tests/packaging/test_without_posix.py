@@ -69,7 +69,6 @@ LEFT_OUT = (
     "test_a_link_works_where_the_platform_lacks_something",
     # The programs that they start have all of POSIX.
     "tests/cli/test_cli_frame.py::test_looking_at_the_commands_loads_none_of_the_heavy_packages",
-    "tests/cli/test_cli_frame.py::test_a_tool_is_read_without_an_eye",
     "tests/cli/test_cli_output.py::test_no_console_makes_a_sentence_fail",
     "tests/cli/test_cli_output.py::test_a_reader_that_leaves_early_causes_no_noise",
 )

@@ -6,6 +6,7 @@ from unittest import mock
 
 import pytest
 
+from tests._rows import each_row
 from tests.soak.adversary import CellKind, live_through
 from tests.soak.adversary.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 from tests.soak.known_defects import DEFECTS
@@ -36,7 +37,7 @@ def test_a_defect_that_is_put_back_is_found_by_its_rule_and_only_with_it(name, r
     assert undisturbed_by_defects().broken == []
 
 
-@pytest.mark.parametrize("name", BY_NAME)
+@each_row("name", BY_NAME)
 def test_what_a_defect_replaces_is_there(name):
     with ExitStack() as stack:
         for place, replacement in BY_NAME[name].replacements.items():

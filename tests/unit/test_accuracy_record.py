@@ -31,6 +31,7 @@ from robolink.errors import CalibrationError, JournalError
 from robolink.methods.one_touch.solvers import find_stored_z
 from robolink.model import EntryKind, NewEntry, Recorded, Signature, ToolOffset, plain_offset
 from robolink.timing import wall_time
+from tests._rows import each_row
 
 # The journal's data for the rows of a cell, and the data that do not count.
 
@@ -108,7 +109,7 @@ def test_what_is_stated_goes_before_the_record_and_what_the_record_says_more_is_
     assert row.on_record.half_width > 0.2
 
 
-@pytest.mark.parametrize(
+@each_row(
     "spoilt",
     [
         {"x_mm": "300", "y_mm": 100},
@@ -208,7 +209,7 @@ def test_the_newest_row_counts_and_that_of_the_station_before_that_of_the_cell()
     assert facts_at(record(*entries), station="PIN-08", stated={}).of("touch_mm").half_width == 0.03
 
 
-@pytest.mark.parametrize(
+@each_row(
     "more",
     [
         {"half_width": 0},
@@ -306,7 +307,7 @@ def test_what_never_scatters_has_the_last_digit_left():
     assert bound.half_width > 0.0003
 
 
-@pytest.mark.parametrize("toward_deg", [0, 30, 135])
+@each_row("toward_deg", [0, 30, 135])
 def test_the_region_of_an_artefact_test_holds_the_bias_in_any_direction(toward_deg):
     rng, bias, held = random.Random(toward_deg), 0.05, []
     dx, dy = (bias * f(math.radians(toward_deg)) for f in (math.cos, math.sin))
@@ -324,7 +325,7 @@ def test_what_is_not_known_of_the_gauge_tip_is_in_the_row():
     )
 
 
-@pytest.mark.parametrize("count", [0, 1, 4])
+@each_row("count", [0, 1, 4])
 def test_fewer_than_five_are_refused(count):
     seen = [(1.0, 2.0)] * count
     for refused in (

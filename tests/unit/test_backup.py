@@ -32,6 +32,7 @@ from robolink.errors import (
 )
 from robolink.files.named import require_free
 from robolink.model import ControllerFacts, ToolOffset
+from tests._rows import each_row
 
 # A backup file is complete, is read strictly, and never replaces another one.
 
@@ -147,7 +148,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("place", WRONG)
+@each_row("place", WRONG)
 def test_what_is_wrong_is_named_by_its_place(place):
     with pytest.raises(ConfigError) as caught:
         backup_from_text(document(WRONG[place]), source="golden.json")
@@ -155,7 +156,7 @@ def test_what_is_wrong_is_named_by_its_place(place):
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize("constant", ["NaN", "Infinity", "-Infinity", "1e999"])
+@each_row("constant", ["NaN", "Infinity", "-Infinity", "1e999"])
 def test_what_is_no_finite_number_is_refused(constant):
     text = backup_to_text(FULL).replace("12.345", constant)
     with pytest.raises(ConfigError, match="number"):
@@ -175,7 +176,7 @@ def test_a_name_that_stands_twice_is_refused():
         backup_from_text(text, source="golden.json")
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", '"x"', "[" * 100_000])
+@each_row("text", ["", "{", "[]", "null", '"x"', "[" * 100_000])
 def test_what_is_no_document_is_refused(text):
     with pytest.raises(ConfigError, match=r"golden\.json"):
         backup_from_text(text, source="golden.json")
@@ -303,7 +304,7 @@ def test_another_tool_in_force_is_a_difference_unless_told():
     assert not compare(*sides, selection_counts=False).same_selection
 
 
-@pytest.mark.parametrize("bad", [-1.0, float("nan"), float("inf")])
+@each_row("bad", [-1.0, float("nan"), float("inf")])
 def test_a_tolerance_is_a_number_from_0_up(bad):
     with pytest.raises(ConfigError, match="tolerance"):
         ComparisonTolerance(bad)

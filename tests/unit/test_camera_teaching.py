@@ -21,6 +21,7 @@ from robolink.stations import (
     station_entry,
     teaching_entry,
 )
+from tests._rows import each_row
 
 URL = "http://user:s3cret-pass@192.168.0.7/snapshot.jpg"
 CELL = """
@@ -150,7 +151,7 @@ def test_without_a_cell_file_what_was_stated_when_it_was_taught_counts(log):
     assert shape_stated(found.details) == {"diameter_mm": 0.98, "bore": False}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("line", "key"),
     [
         ("diameter_mm = 0", "diameter_mm"),

@@ -15,6 +15,7 @@ from robolink_simulators.pictures.folder import PictureFolder
 from robolink_simulators.pictures.source import DrawnPictures
 
 from robolink.errors import CalibrationError
+from tests._rows import each_row
 from tests.unit._drawn_cells import PLAIN, bring_to, cell_before_camera
 
 _STEP_MM = 1.0
@@ -45,7 +46,7 @@ def test_a_picture_shows_the_robot_where_it_is():
     assert seen() == [0, 1, 2, 3, 4, 5, 6, 7]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("faults", "shown"),
     [
         ({"picture_stuck": "same"}, [0, 0, 0, 0, 0, 0, 0, 0]),
@@ -101,7 +102,7 @@ def test_pictures_late_by_seconds_show_what_was_then():
     assert shown == [0, 0, 0, 1, 2, 3]
 
 
-@pytest.mark.parametrize(("shape", "inside"), [("disc", True), ("ring", False), ("tip", False)])
+@each_row(("shape", "inside"), [("disc", True), ("ring", False), ("tip", False)])
 def test_what_stands_still_stays_where_it_is(shape, inside):
     toward: dict[str, Any] = {"picture_fleck_beside_px": 200.0, "picture_fleck_toward_deg": 90.0}
     simulator = cell_before_camera(picture_fleck=shape, **toward, **PLAIN)

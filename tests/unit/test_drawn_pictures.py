@@ -14,6 +14,7 @@ from robolink_simulators.pictures.scene import DrawnScene, Placed, SeenTip
 from robolink_simulators.pictures.shading import disc
 
 from robolink.errors import ConfigError
+from tests._rows import each_row
 from tests.unit._drawn_cells import (
     KINDS,
     PLAIN,
@@ -119,8 +120,8 @@ def alike(first, second):
     return float((first * second).sum() / math.sqrt((first**2).sum() * (second**2).sum()))
 
 
-@pytest.mark.parametrize("mirrored", [True, False])
-@pytest.mark.parametrize("tip", [{"tip_kind": "rough"}, {"tip_dirt": 4}, {"tip_kind": "needle"}])
+@each_row("mirrored", [True, False])
+@each_row("tip", [{"tip_kind": "rough"}, {"tip_dirt": 4}, {"tip_kind": "needle"}])
 def test_what_belongs_to_the_tool_turns_with_it(tip, mirrored):
     simulator = cell_before_camera(camera_mirrored=mirrored, **tip, **PLAIN)
     before = cut_out(picture_of(simulator))
@@ -291,7 +292,7 @@ def test_markers_of_a_held_board_are_read_by_opencv():
         assert corners[0].mean(axis=(0, 1)) == pytest.approx((639.5, 511.5), abs=0.6)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "text"), [("tip_diameter_mm", "0"), ("tip_dirt", "21"), ("picture_clutter", "1000000")]
 )
 def test_what_cannot_be_drawn_is_refused(name, text):

@@ -26,6 +26,7 @@ from robolink.protocols.epson_text import (
     Reply,
     Request,
 )
+from tests._rows import each_row
 
 PRINTED = [chr(code) for code in range(0x20, 0x7F) if chr(code) != '"']
 DIALECTS = st.builds(
@@ -96,7 +97,7 @@ def events_of(codec: EpsonBinaryCodec, chunks: Iterator[bytes]) -> list[Event]:
     return events
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("request_", "frame"),
     [
         (Request("Start", ("0",)), "02 47 00 03 44"),
@@ -116,7 +117,7 @@ def test_a_number_can_be_written_in_digits_and_the_check_sum_does_not_tell() -> 
     assert codec.send(Request("Start", ("0",))) == bytes.fromhex("02 47 30 30 03 44")
 
 
-@pytest.mark.parametrize("parameters", [("counts", "Long", "3"), (), ("counts(0)",)])
+@each_row("parameters", [("counts", "Long", "3"), (), ("counts(0)",)])
 def test_only_a_single_variable_is_asked_for(parameters: tuple[str, ...]) -> None:
     with pytest.raises(LocalProtocolError, match="a single variable"):
         EpsonBinaryCodec(Role.HOST, Dialect(letters=Letters.GUESSED)).send(
@@ -192,7 +193,7 @@ def test_a_device_refuses_a_broken_request_once_the_line_is_silent() -> None:
     assert device.next_event() == Request("GetStatus")
 
 
-@pytest.mark.parametrize("name", ["GetContNo", "GetAlm", "GetErrMsg", "Abort", "SetIOByte"])
+@each_row("name", ["GetContNo", "GetAlm", "GetErrMsg", "Abort", "SetIOByte"])
 def test_what_has_no_printed_letter_is_refused_by_name_and_not_sent(name: str) -> None:
     with pytest.raises(LocalProtocolError, match=name):
         EpsonBinaryCodec(Role.HOST).send(Request(name))

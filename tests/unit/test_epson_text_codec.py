@@ -28,13 +28,14 @@ from robolink.protocols.epson_text import (
     parse_status,
     status_fields,
 )
+from tests._rows import each_row
 
 # Status flags, error codes and the command table.
 
 FLAGS = st.builds(StatusFlags, *(st.booleans() for _ in fields(StatusFlags)))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("word", "flags"),
     [
         ("00100000001", StatusFlags(auto=True, ready=True)),
@@ -52,7 +53,7 @@ def test_flags_are_read_from_the_right_in_both_lengths(word, flags):
     assert parse_status(Reply("getStatus", (word, "0517"))) == (flags, 517)
 
 
-@pytest.mark.parametrize(
+@each_row(
     "reply",
     [
         Reply("GetStatus", ("001000000010", "0000")),
@@ -153,8 +154,8 @@ def test_only_execute_takes_a_statement_and_only_login_a_password():
 # The messages that each role may send, and those that it may not.
 
 
-@pytest.mark.parametrize("terminator", [b"\r\n", b"\r", b"\n"])
-@pytest.mark.parametrize(
+@each_row("terminator", [b"\r\n", b"\r", b"\n"])
+@each_row(
     ("request_", "line"),
     [
         (Request("GetStatus"), b"$GetStatus"),
@@ -170,7 +171,7 @@ def test_a_request_is_one_line_with_the_terminator(request_, line, terminator):
     assert codec.send(request_) == line + terminator
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("reply", "line"),
     [
         (Reply("Stop", ("0",)), b"#Stop,0"),
@@ -184,7 +185,7 @@ def test_an_answer_is_one_message_with_the_terminator(reply, line):
     assert EpsonTextCodec(Role.DEVICE, terminator=b"\r").send(reply) == line + b"\r"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "bad",
     [
         Request("Nope"),
@@ -224,7 +225,7 @@ def test_a_host_refuses_to_send_what_the_protocol_forbids(bad):
     assert codec.send(Request("GetStatus")) == b"$GetStatus\r\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "bad",
     [
         Request("GetStatus"),
@@ -300,7 +301,7 @@ def test_bytes_after_the_end_of_the_stream_are_refused():
     assert codec.next_event() == EndOfStream()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("role", "options"),
     [
         (Role.HOST, {"terminator": b""}),

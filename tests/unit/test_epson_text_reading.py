@@ -16,6 +16,7 @@ from robolink.protocols.epson_text import (
     Request,
 )
 from robolink.protocols.epson_text._messages import next_request
+from tests._rows import each_row
 
 HOST_CASES: list[tuple[bytes, list[Event]]] = [
     (b"#Login,0\r\n", [Reply("Login", ("0",))]),
@@ -109,7 +110,7 @@ def events_of(codec: EpsonTextCodec, chunks: Iterable[bytes]) -> list[Event]:
     return events
 
 
-@pytest.mark.parametrize(("role", "data", "expected"), CASES)
+@each_row(("role", "data", "expected"), CASES)
 def test_a_message_is_read_in_one_piece(role, data, expected):
     codec = EpsonTextCodec(role)
     assert events_of(codec, [data]) == expected
@@ -118,12 +119,12 @@ def test_a_message_is_read_in_one_piece(role, data, expected):
     assert codec.next_event() == EndOfStream()
 
 
-@pytest.mark.parametrize(("role", "data", "expected"), CASES)
+@each_row(("role", "data", "expected"), CASES)
 def test_a_message_is_read_byte_by_byte(role, data, expected):
     assert events_of(EpsonTextCodec(role), (bytes([b]) for b in data)) == expected
 
 
-@pytest.mark.parametrize(("role", "data", "expected"), CASES)
+@each_row(("role", "data", "expected"), CASES)
 def test_bytes_behind_a_message_are_kept_for_the_next(role, data, expected):
     codec = EpsonTextCodec(role)
     start, rest = (b"#Stop", b",0\r\n") if role is Role.HOST else (b"$St", b"op\r\n")
@@ -146,7 +147,7 @@ def test_an_event_does_not_wait_for_the_line_feed_after_a_carriage_return():
     assert events_of(codec, [b"#B,0\r", b"\n#C,0\r\n"]) == [Reply("B", ("0",)), Reply("C", ("0",))]
 
 
-@pytest.mark.parametrize(
+@each_row(
     "data",
     [
         b"Login,0\r\n",
@@ -201,7 +202,7 @@ def test_a_second_empty_line_after_an_answer_is_an_error():
         codec.next_event()
 
 
-@pytest.mark.parametrize("held", [b"#Exec", b'#Execute,"half\r\n', b"!"])
+@each_row("held", [b"#Exec", b'#Execute,"half\r\n', b"!"])
 def test_a_stream_that_ends_inside_an_answer_is_an_error(held):
     codec = EpsonTextCodec(Role.HOST)
     assert events_of(codec, [b"#A,0\r\n" + held]) == [Reply("A", ("0",))]
@@ -233,7 +234,7 @@ def test_an_overlong_quoted_text_is_an_error_with_and_without_its_end():
             codec.next_event()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("encoding", "text"),
     [("cp1252", "Öffnung"), ("shift_jis", "表示ソ"), ("gb18030", "错误丂"), ("big5", "功能許")],
 )

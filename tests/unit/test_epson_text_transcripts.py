@@ -18,6 +18,7 @@ from robolink.protocols.epson_text import (
     parse_status,
 )
 from robolink.protocols.spel import parse_point
+from tests._rows import each_row
 
 FILE = Path(__file__).parents[1] / "transcripts" / "epson_text.toml"
 EXCHANGES: list[dict[str, Any]] = tomllib.loads(FILE.read_text("utf-8"))["exchange"]
@@ -44,8 +45,8 @@ def test_every_vector_is_there():
     assert {e["evidence"] for e in EXCHANGES} == {"seen", "documented", "computed"}
 
 
-@pytest.mark.parametrize("terminator", TERMINATORS)
-@pytest.mark.parametrize("exchange", EXCHANGES, ids=lambda e: f"{e['vector']}")
+@each_row("terminator", TERMINATORS)
+@each_row("exchange", EXCHANGES)
 def test_a_request_is_read_by_the_device_and_written_by_the_host(exchange, terminator):
     line = exchange["request"].encode()
     event = one_event(Role.DEVICE, line + terminator)
@@ -58,10 +59,8 @@ def test_a_request_is_read_by_the_device_and_written_by_the_host(exchange, termi
     assert written == line.removesuffix(surplus) + terminator
 
 
-@pytest.mark.parametrize("terminator", TERMINATORS)
-@pytest.mark.parametrize(
-    "exchange", [e for e in EXCHANGES if "reply" in e], ids=lambda e: f"{e['vector']}"
-)
+@each_row("terminator", TERMINATORS)
+@each_row("exchange", [e for e in EXCHANGES if "reply" in e])
 def test_an_answer_is_read_by_the_host_and_written_by_the_device(exchange, terminator):
     line = exchange["reply"].encode()
     event = one_event(Role.HOST, line + terminator)

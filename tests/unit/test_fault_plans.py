@@ -28,6 +28,7 @@ from robolink_simulators.softmotion.mailbox.exchange import WireFaults
 import robolink
 from robolink.errors import ConfigError, OutcomeUnknownError
 from robolink.model import ToolOffset
+from tests._rows import each_row
 from tools.fault_tables import tables
 
 # Fault plans in files: read, refused with line and key, and applied where they can occur.
@@ -90,7 +91,7 @@ match = "read_response"
     assert {type(fault) for fault in plan.faults} == {PlcFault}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "told"),
     [
         (
@@ -205,14 +206,14 @@ def test_another_seed_draws_another_plan():
     assert drawn_faults(1, LinkKind.EPSON_TCP, RATES) != drawn_faults(2, LinkKind.EPSON_TCP, RATES)
 
 
-@pytest.mark.parametrize("kind", STREAMS)
+@each_row("kind", STREAMS)
 def test_all_that_a_stream_can_have_is_drawn_and_nothing_else(kind):
     drawn = {fault.action for fault in drawn_faults(3, kind, FaultRates(0.5, 2000))}
     possible = {action for action in FaultAction if kind in links_of(action)}
     assert drawn == possible - ONLY_BY_NAME
 
 
-@pytest.mark.parametrize("kind", MAILBOXES)
+@each_row("kind", MAILBOXES)
 def test_all_that_a_mailbox_can_have_is_drawn_and_nothing_else(kind):
     drawn = {fault.action for fault in drawn_plc_faults(3, kind, FaultRates(0.5, 2000))}
     possible = {action for action in PlcFaultAction if kind in links_of(action)}
@@ -252,9 +253,7 @@ def test_what_a_link_cannot_have_is_not_drawn_for_it():
         drawn_plc_faults(1, LinkKind.MODBUS_TCP, wanted)
 
 
-@pytest.mark.parametrize(
-    "numbers", [{"rate": 1.1}, {"rate": -0.1}, {"exchanges": -1}, {"exchanges": 10**7}]
-)
+@each_row("numbers", [{"rate": 1.1}, {"rate": -0.1}, {"exchanges": -1}, {"exchanges": 10**7}])
 def test_rates_have_limits(numbers):
     with pytest.raises(ConfigError):
         FaultRates(**numbers)
@@ -291,7 +290,7 @@ def test_a_fault_goes_on_in_its_steps_until_it_is_removed():
     assert plan.take("Execute f") == plan.pending == ()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("fault", "left"),
     [
         (Fault(FaultAction.DELAY, seconds=2.0), [(2.0, REPLY)]),
@@ -306,7 +305,6 @@ def test_a_fault_goes_on_in_its_steps_until_it_is_removed():
         (Fault(FaultAction.DISCONNECT, position=7), [(0.0, REPLY[:7]), (0.0, None)]),
         (Fault(FaultAction.ESTOP), [(0.0, REPLY)]),
     ],
-    ids=lambda value: value.action.name if isinstance(value, Fault) else "",
 )
 def test_what_leaves_instead_of_a_reply(fault, left):
     assert FaultPlan().departures(REPLY, [fault]) == left

@@ -20,6 +20,7 @@ from robolink.errors import TransportBrokenError, TransportTimeoutError
 from robolink.model import Secret, ToolOffset
 from robolink.protocols.mailbox import BlockError, Opcode, WordOrder, decode_response
 from robolink.transport import open_transport
+from tests._rows import each_row
 from tests.unit._mailbox_client import owning
 
 ROBOT, STATUS = "#GetCurRobot,1", "#GetStatus,00100000001,0000"
@@ -125,7 +126,7 @@ def test_nobody_is_told_of_a_half_open_link(login, connect):
     assert simulator._links._links == [other.link]  # nothing of the dead one is kept
 
 
-@pytest.mark.parametrize("action", ["reset", "half_open", "restart"])
+@each_row("action", ["reset", "half_open", "restart"])
 def test_a_driver_meets_the_ends_of_a_connection(action):
     simulator = faulty(action, match="GetCurRobot")
     transport = open_transport(register("fault-ends", simulator))
@@ -236,7 +237,7 @@ def test_an_answer_of_zeros_is_no_block():
     assert not any(client.link.read_response())
 
 
-@pytest.mark.parametrize("order", ["high_first", "pairs_swapped", "halves_swapped"])
+@each_row("order", ["high_first", "pairs_swapped", "halves_swapped"])
 def test_values_may_be_laid_in_another_order_after_an_online_change(order):
     client, _ = planned("word_order", match="read_head", order=order)
     usual = client.link.read_response()[84:88]

@@ -14,6 +14,8 @@ from robolink_simulators.epson.memory.inputs import InputBits, TipInput
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.statements.conditions import Watch
 
+from tests._rows import each_row
+
 PLACE_MM = (250.0, 420.0, -60.0)
 SEARCHES = 6
 KINDS = ("plate", "pin", "plane", "ball", "beam")
@@ -117,7 +119,7 @@ def test_a_robot_with_play_and_one_that_turns_are_asked_each_millisecond():
     assert arm.within_until(5, 10.0) == 5
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@each_row("kind", KINDS)
 def test_within_its_leeway_no_switch_changes(kind):
     rng = random.Random(kind)
     for _ in range(200):

@@ -16,6 +16,7 @@ from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal._lease import BEAT_S
 from robolink.journal._lease_view import LEASE_S
 from robolink.model import EntryKind, NewEntry
+from tests._rows import each_row
 from tests.unit._lease_logs import ANNA, BERT, ELSEWHERE, HERE, IDENTITY, leases_in_memory, marker
 
 # One client at a time on a controller: who has the lease, who may take it over, who is told.
@@ -299,7 +300,7 @@ def _start_of(pid):
     return f"{namespace} {fields[19]}"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "other",
     [
         replace(HERE, pid=2**22 + 1, boot="another boot"),
@@ -308,7 +309,6 @@ def _start_of(pid):
         replace(HERE, pid=2**22 + 1, process_start="pid:[1] 5"),
         HERE,
     ],
-    ids=["other boot", "no boot", "no start", "other container", "alive"],
 )
 def test_nobody_is_called_gone_without_proof(other):
     assert not HERE.proves_gone(other)

@@ -13,6 +13,7 @@ from robolink.errors import JournalError
 from robolink.journal import ChainVerification, memory_journal, open_journal
 from robolink.journal.store.statements import COLUMNS as STORED
 from robolink.model import EntryKind, Hand, Marker, MarkerKind, NewEntry, Signature, new_operation
+from tests._rows import each_row
 
 # Markers and entries as a driver stores them: each step is one transaction.
 
@@ -291,7 +292,7 @@ def test_any_single_field_that_is_changed_is_found(number, column, value):
     journal.close()
 
 
-@pytest.mark.parametrize("column", COLUMNS)
+@each_row("column", COLUMNS)
 def test_a_changed_field_names_its_entry(column):
     journal = filled(3)
     tamper(journal, f"UPDATE entries SET {column} = '7' WHERE number = 2")
@@ -300,7 +301,7 @@ def test_a_changed_field_names_its_entry(column):
     assert found[0].startswith(named)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("condition", "problem"),
     [
         ("number = 1", "Entry 1 is missing."),
@@ -317,7 +318,7 @@ def test_entries_that_are_gone_are_named(condition, problem):
     assert journal.verify().problems == (problem,)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("statement", "problem"),
     [
         ("UPDATE head SET number = 4", "The journal ends with entry 4, but there are entries up"),
@@ -361,7 +362,7 @@ def test_progress_is_told_page_by_page():
     assert told == [(500, 1200), (1000, 1200), (1200, 1200)]
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), {1, 2}])
+@each_row("value", [float("nan"), float("inf"), object(), {1, 2}])
 def test_details_that_are_no_plain_json_are_refused_and_leave_nothing(value):
     journal = filled(1)
     log = journal.log("cell")

@@ -11,6 +11,7 @@ from robolink.journal import _places, default_location
 from robolink.journal._outbox import home_of
 from robolink.journal._places import place_of, without_user
 from robolink.journal.store.connection import parameters_of
+from tests._rows import each_row
 
 # The place of a journal: named by a variable, a path or a URL, and shown without passwords.
 
@@ -57,7 +58,7 @@ def test_a_relative_path_is_made_absolute(monkeypatch, tmp_path):
     assert place_of("sqlite:///journal.db").path == tmp_path / "journal.db"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("url", "shown"),
     [
         ("postgresql://u:geheim@db:5432/j", "postgresql+psycopg://u:***@db:5432/j"),
@@ -77,9 +78,7 @@ def test_a_password_is_not_shown(url, shown):
     assert "heim" not in repr(place)
 
 
-@pytest.mark.parametrize(
-    "url", ["sqlite://", "sqlite:///", "mysql://db/j", "postgresql://", "x://"]
-)
+@each_row("url", ["sqlite://", "sqlite:///", "mysql://db/j", "postgresql://", "x://"])
 def test_a_database_that_cannot_keep_a_journal_is_refused(url):
     with pytest.raises(JournalError) as caught:
         place_of(url)
@@ -102,7 +101,7 @@ def test_no_database_code_is_loaded_before_a_journal_is_opened():
     assert shown.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("url", "told"),
     [
         ("cells@db.plant/journal", {"user": "cells", "host": "db.plant", "dbname": "journal"}),
@@ -133,7 +132,7 @@ def mount(point, kind, *, optional=""):
     return f"90 27 0:50 / {point} rw,relatime {optional}- {kind} server:/export rw,vers=4.2\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "kind",
     ["nfs", "nfs4", "cifs", "smb3", "9p", "afs", "ceph", "fuse.sshfs", "fuse.glusterfs", "vboxsf"],
 )
@@ -143,12 +142,12 @@ def test_each_kind_of_share_is_known_by_its_name(kind):
     assert _places.share_in(table, "/srv/cells2/journal.db") is None
 
 
-@pytest.mark.parametrize("kind", ["ext4", "xfs", "btrfs", "tmpfs", "overlay", "fuseblk", "zfs"])
+@each_row("kind", ["ext4", "xfs", "btrfs", "tmpfs", "overlay", "fuseblk", "zfs"])
 def test_a_file_system_of_this_computer_is_none(kind):
     assert _places.share_in(ROOT + mount("/srv", kind), "/srv/journal.db") is None
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("table", "found"),
     [
         (mount("/srv", "nfs") + mount("/srv/local", "ext4"), None),
@@ -173,7 +172,7 @@ def test_blanks_in_the_name_of_a_mount_are_understood(point, folder):
     assert _places.share_in(ROOT + mount(point, "cifs"), f"{folder}/journal.db") == "cifs"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("path", "kind", "found"),
     [
         (r"\\server\cells\journal.db", 0, "UNC"),
@@ -187,7 +186,7 @@ def test_on_windows_the_path_or_its_drive_tells(path, kind, found):
     assert _places.share_of_windows(path, lambda _: kind) == found
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("location", "shared"),
     [
         ("postgresql+psycopg://owner@h:5/d?options=a@b", "postgresql+psycopg://h:5/d?options=a@b"),

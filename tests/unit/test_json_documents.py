@@ -31,6 +31,7 @@ from robolink.model import RotationMatrix, ToolReceipt, ValueReceipt
 from robolink.model._documents import members_of, schema_of, value_fields
 from robolink.protocols.mailbox import Capability
 from tests._json_schema import Schemas
+from tests._rows import each_row
 from tools import value_schemas
 from tools.api import public
 
@@ -220,8 +221,8 @@ FLOATS = [np.float16, np.float32, np.float64, np.longdouble, float]
 WHOLE_NUMBERS = [np.int8, np.uint8, np.int16, np.uint64, np.int64, int]
 
 
-@pytest.mark.parametrize("wrap", [lambda it: it, np.array], ids=["scalar", "array"])
-@pytest.mark.parametrize("number", [0.0, -0.0, 1.5, -65504.0, math.inf, -math.inf, math.nan])
+@each_row("wrap", [lambda it: it, np.array])
+@each_row("number", [0.0, -0.0, 1.5, -65504.0, math.inf, -math.inf, math.nan])
 def test_a_row_of_numbers_of_any_width_comes_back(number, wrap):
     for floating, whole in itertools.product(FLOATS, WHOLE_NUMBERS):
         for count in (0, 127):
@@ -243,7 +244,7 @@ ENDLESS: list[object] = []
 ENDLESS.append(ENDLESS)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("value", "said"),
     [
         (replace(SHEET, said=math.nan), "Sheet.said holds nan"),
@@ -270,7 +271,7 @@ def test_what_json_cannot_hold_is_refused_by_its_place(value, said):
         to_json(value)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "said"),
     [
         ({"schema": "robolink/value/ToolOffset/2"}, "from a newer version.*Update robolink"),
@@ -313,7 +314,7 @@ for _ in range(100_000):
     DEEP = [DEEP]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "said"),
     [
         ({"by_tool": {" 3": None}}, "Sheet.by_tool is ' 3', a value of another type"),
@@ -346,7 +347,7 @@ def test_the_bits_of_a_flag_come_back_and_a_truth_value_is_none():
             from_json(MailboxFacts, document | {"capabilities": wrong})
 
 
-@pytest.mark.parametrize("document", [None, [], "{}", 5])
+@each_row("document", [None, [], "{}", 5])
 def test_what_is_no_document_is_refused(document):
     with pytest.raises(DocumentError, match="names no schema"):
         from_json(ToolOffset, document)

@@ -10,6 +10,7 @@ import pytest
 
 from robolink.messages import Translated
 from robolink.model import Hand, Pose, from_fields, json_fields, json_value
+from tests._rows import each_row
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def test_what_json_cannot_hold_is_refused():
         json_value({"tool": object()})
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("change", "error"),
     [
         ({"rows": [{"name": "pin", "u_mm": 0.04}]}, KeyError),

@@ -30,6 +30,7 @@ from robolink.model import (
 )
 from robolink.runner import Confirm, Runner, RunSettings
 from robolink.runtime import in_a_thread, replaced
+from tests._rows import each_row
 from tests.contract._quiet_time import QuietTime
 
 # The state of a controller follows from what was begun, answered, read and recorded.
@@ -371,7 +372,7 @@ def test_an_answer_waits_for_the_change_that_it_leads_to():
     assert len(list(log.recorded(kinds=(EntryKind.DECISION,)))) == 1, "once"
 
 
-@pytest.mark.parametrize("kind", [EntryKind.STATION, EntryKind.DONE, EntryKind.NOT_APPLIED])
+@each_row("kind", [EntryKind.STATION, EntryKind.DONE, EntryKind.NOT_APPLIED])
 def test_without_a_change_it_goes_with_what_it_led_to(kind):
     log = memory_journal(f"answers-{kind}").log("a")
     log.answered(an_answer())

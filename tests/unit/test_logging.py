@@ -18,6 +18,7 @@ from robolink.model import Secret
 from robolink.package_log import PackageLog
 from robolink.timing import Deadline, SystemClock
 from robolink.transport import SECRET_PLACEHOLDER, TracingTransport, Traffic, told_to
+from tests._rows import each_row
 from tests.unit.test_transport_trace import ScriptedTransport, soon
 
 PASSWORD = "canary-7413"
@@ -239,7 +240,7 @@ def test_the_usual_answer_to_a_login_is_told_in_however_many_pieces():
     assert b"".join(told) == SECRET_PLACEHOLDER + b"#Login,0\r\n#Login,0\r\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "pieces",
     [
         (LOGIN,),

@@ -47,6 +47,7 @@ from robolink.protocols.mailbox import (
     opcodes_of,
     slot_start,
 )
+from tests._rows import each_row
 
 # The mailbox's blocks: layout as in the register map, complete or refused.
 
@@ -87,7 +88,7 @@ def test_the_blocks_have_their_sizes():
     assert (slot_start(1), slot_start(2), slot_start(15)) == (112, 148, 616)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("layout", "places"),
     [
         (COMMAND, {"i3": 7, "pose": 8, "dyn": 32, "name": 48, "owner": 56, "crc": 61}),
@@ -119,7 +120,7 @@ def test_the_probe_lies_low_word_first():
 
 
 @pytest.mark.fault("F07")
-@pytest.mark.parametrize("name", BLOCKS)
+@each_row("name", BLOCKS)
 def test_f07_any_single_flipped_bit_is_refused(name):
     words, decode = BLOCKS[name]
     for word in range(len(words)):
@@ -139,7 +140,7 @@ def test_the_heartbeat_may_change_alone():
 
 
 @pytest.mark.fault("F28", "F32")
-@pytest.mark.parametrize("cut", range(1, 64))
+@each_row("cut", range(1, 64))
 def test_f28_f32_a_torn_command_is_refused(cut):
     old = encode_command(WRITE)
     new = encode_command(Command(4712, Opcode.SELECT_TOOL, owner=1))
@@ -171,8 +172,8 @@ def test_zeroes_are_nobodys_answer(name):
     assert fault_of(decode, (0,) * len(words)) is BlockFault.EMPTY
 
 
-@pytest.mark.parametrize("name", BLOCKS)
-@pytest.mark.parametrize("change", [lambda w: w[:-1], lambda w: (*w, 0), lambda w: ()])
+@each_row("name", BLOCKS)
+@each_row("change", [lambda w: w[:-1], lambda w: (*w, 0), lambda w: ()])
 def test_another_number_of_words_is_refused(name, change):
     words, decode = BLOCKS[name]
     assert fault_of(decode, change(words)) is BlockFault.LENGTH
@@ -186,13 +187,13 @@ def test_a_refused_checksum_names_the_block_it_stood_in():
     assert (caught.value.head, caught.value.crc) == (4711, words[61])
 
 
-@pytest.mark.parametrize("version", [0x0000, 0x0200, 0xFF00])
+@each_row("version", [0x0000, 0x0200, 0xFF00])
 def test_a_command_of_another_major_is_read_to_be_refused_by_name(version):
     command = decode_command(encode_command(Command(1, Opcode.STOP, owner=5, version=version)))
     assert (command.refusal(), command.owner) == (ErrorClass.VERSION, 5)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("command", "refusal"),
     [
         (Command(1, Opcode.HALT, version=0x01FF), ErrorClass.NONE),
@@ -211,7 +212,7 @@ def test_a_snapshot_of_another_major_is_refused_and_of_another_minor_is_read():
     assert decode_response(encode_response(Response(version=0x0105))).version == 0x0105
 
 
-@pytest.mark.parametrize(
+@each_row(
     "command",
     [
         Command(0, Opcode.HALT),
@@ -306,7 +307,7 @@ def test_every_error_class_has_words_of_its_own():
     assert len({error_meaning(code) for code in ErrorClass}) == len(ErrorClass)
 
 
-@pytest.mark.parametrize(("number", "part"), [(199, "mailbox"), (250, "state"), (777, "communic")])
+@each_row(("number", "part"), [(199, "mailbox"), (250, "state"), (777, "communic")])
 def test_an_unknown_error_class_is_told_by_its_hundreds(number, part):
     assert part in error_meaning(number)
 
@@ -319,7 +320,7 @@ def test_final_states():
     assert [state.name for state in CommandState if state.final] == ["DONE", "ABORTED", "ERROR"]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "code"),
     [
         ("Kin_Scara3_Z", Kinematics.SCARA3_Z),
@@ -332,7 +333,7 @@ def test_kinematics_are_found_by_the_name_of_their_block(name, code):
     assert find_kinematics(name) is code
 
 
-@pytest.mark.parametrize(("number", "following"), [(0, 1), (1, 2), (65534, 65535), (65535, 1)])
+@each_row(("number", "following"), [(0, 1), (1, 2), (65534, 65535), (65535, 1)])
 def test_counters_leave_zero_out(number, following):
     assert next_number(number) == following
 
@@ -351,7 +352,7 @@ def test_heartbeats_count_from_1_to_255():
     assert not beats_for(0x0200, 0x0102)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("words", "order"),
     [
         (LOW_FIRST, WordOrder.LOW_FIRST),

@@ -23,6 +23,7 @@ from robolink.protocols.mailbox import (
     from_frame,
     to_frame,
 )
+from tests._rows import each_row
 from tests.unit._mailbox_client import linked
 from tests.unit.softmotion_driver._cell import Cell
 
@@ -236,9 +237,7 @@ def test_a_tool_that_points_back_has_one_angle_too():
     np.testing.assert_allclose(zyz_matrix(frame[3:]), uvw_matrix((30, 180, 0)), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("unit_um", "expected"), [(1000.0, 12.5), (1.0, 12500.0), (10000.0, 1.25), (1e6, 0.0125)]
-)
+@each_row(("unit_um", "expected"), [(1000.0, 12.5), (1.0, 12500.0), (10000.0, 1.25), (1e6, 0.0125)])
 def test_lengths_are_in_user_units(unit_um, expected):
     assert to_frame((12.5, 0, 0, 0, 0, 0), unit_um=unit_um)[0] == pytest.approx(expected, rel=1e-15)
     assert from_frame((expected, 0, 0, 0, 0, 0), unit_um=unit_um)[0] == pytest.approx(12.5)
@@ -259,7 +258,7 @@ def test_angles_that_mean_the_same_are_the_same_frame():
     assert frames_match((0, 0, 0, 10, 20, 30), (0, 0, 0, 190, -20, 210), tolerance=1e-9)
 
 
-@pytest.mark.parametrize("place", range(6))
+@each_row("place", range(6))
 def test_frames_that_differ_are_told_apart(place):
     one = (1.0, 2.0, 3.0, 10.0, 20.0, 30.0)
     x, y, z, a, b, c = (value + 1e-5 * (n == place) for n, value in enumerate(one))
@@ -267,7 +266,7 @@ def test_frames_that_differ_are_told_apart(place):
     assert frames_match(one, (x, y, z, a, b, c), tolerance=2e-5)
 
 
-@pytest.mark.parametrize("place", range(6))
+@each_row("place", range(6))
 def test_what_is_no_number_is_equal_to_nothing(place):
     x, y, z, a, b, c = (math.nan if at == place else 10.0 * at for at in range(6))
     frame = (x, y, z, a, b, c)

@@ -121,6 +121,8 @@ def test_a_head_is_the_newest_that_was_sent(link_to):
     head = link.read_head()
     assert (head.ack, head.state, head.group_state) == (2, 15, 5)
     assert (head.error_class, head.heartbeat) == (203, 8)
+    with pytest.raises(TransportTimeoutError):
+        link.read_head()  # each is taken once
 
 
 @pytest.mark.parametrize("sent", [(), ((TPDO1, b"\1\2\3"),)])

@@ -22,6 +22,7 @@ from pymodbus.pdu.register_message import (
 )
 
 from robolink.transport.modbus.frames import Area, FrameError, ModbusRequest, RtuFraming, TcpFraming
+from tests._rows import each_row
 
 READ = ModbusRequest(unit=5, function=4, area=Area.INPUT, address=0, count=3)
 WRITE = ModbusRequest(unit=5, function=16, area=Area.HOLDING, address=7, count=2, values=(1, 2))
@@ -95,7 +96,7 @@ def test_two_frames_that_arrive_together_are_two():
         assert [reply and reply.values for reply in taken] == [(1, 2, 3), (4, 5, 6), None]
 
 
-@pytest.mark.parametrize(
+@each_row(
     "header",
     [
         bytes.fromhex("0001 0001 0009 05 04"),  # another protocol
@@ -109,19 +110,19 @@ def test_what_is_no_modbus_tcp_is_refused_at_its_header(header):
         TcpFraming().take(bytearray(header))
 
 
-@pytest.mark.parametrize("function", [0, 7, 23, 43, 0x7F])
+@each_row("function", [0, 7, 23, 43, 0x7F])
 def test_a_serial_frame_of_a_function_never_asked_for_is_refused(function):
     with pytest.raises(FrameError):
         RtuFraming().take(bytearray(rtu(bytes([function, 0, 0, 0, 0]))))
 
 
-@pytest.mark.parametrize("payload", [b"\x04\x06\x00\x01", b"\x04", b"\x04\x03\x00\x01\x02"])
+@each_row("payload", [b"\x04\x06\x00\x01", b"\x04", b"\x04\x03\x00\x01\x02"])
 def test_a_tcp_answer_of_another_length_than_it_says_is_refused(payload):
     with pytest.raises(FrameError):
         TcpFraming().take(bytearray(tcp(payload)))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("request_", "payload", "answers"),
     [
         (READ, read_answer([1, 2, 3]), True),
@@ -156,7 +157,7 @@ def test_requests_are_what_the_standard_prints():
     assert RtuFraming().pack(COIL, 0)[:-2] == bytes.fromhex("05 05 0009 ff00")
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("area", "address", "reference"),
     [
         (Area.HOLDING, 0, "40001"),

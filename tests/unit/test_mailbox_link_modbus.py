@@ -17,6 +17,7 @@ from robolink.transport.modbus.client import ModbusClient
 from robolink.transport.modbus.frames import Area, RtuFraming, TcpFraming
 from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
+from tests._rows import each_row
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, rtu, tcp, words
 
 # Over TCP: matching answers to requests, and the meaning of refusals.
@@ -95,10 +96,9 @@ def test_frames_that_come_in_a_flood_are_named_before_the_deadline():
 
 
 @pytest.mark.fault("F10")
-@pytest.mark.parametrize(
+@each_row(
     "answer",
     [tcp(words(1, 2), 1), tcp(words(1, function=3), 1), tcp(words(1), 1, unit=1)],
-    ids=["length", "function", "unit"],
 )
 def test_an_answer_that_does_not_fit_its_number_ends_the_link(answer):
     line, client = over_tcp(lambda frame: [answer])
@@ -123,7 +123,7 @@ def test_a_server_that_has_hung_up_is_noticed_before_anything_is_sent():
     assert not line.sent
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("code", "kind", "sentence"),
     [
         (1, RejectedError, "illegal function"),
@@ -154,7 +154,7 @@ def test_a_refused_read_changed_nothing_whatever_its_code():
     assert not line.closed
 
 
-@pytest.mark.parametrize(
+@each_row(
     "ask",
     [
         lambda client: client.read_input(-1, 1),

@@ -28,6 +28,7 @@ from robolink.transport import (
 from robolink.transport._url import UrlOptions
 from robolink.transport.modbus.mailbox import _take_places
 from robolink.transport.serial_port import SerialSettings, open_serial, serial_device
+from tests._rows import each_row
 
 # The allowed URLs of a mailbox, and the cost of importing the package.
 
@@ -36,7 +37,7 @@ RTU = "softmotion+modbus-rtu:///dev/no-such-port"
 CAN = "softmotion+can://desk"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("url", "named"),
     [
         (f"{TCP}?baud=9600", "baud"),
@@ -103,7 +104,7 @@ def test_the_slots_follow_the_response_unless_they_are_elsewhere():
     assert places("response=200&slots=1000").slots == 1000
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("query", "sentence"),
     [
         ("slots=111", r"30112 \(address 111\)"),
@@ -130,9 +131,7 @@ def test_a_serial_port_is_named_the_way_of_its_system(url, device):
     assert serial_device(parse_url(url)) == device
 
 
-@pytest.mark.parametrize(
-    ("parity", "stop_bits", "bits"), [("N", 1, 10), ("E", 1, 11), ("N", 2, 11)]
-)
+@each_row(("parity", "stop_bits", "bits"), [("N", 1, 10), ("E", 1, 11), ("N", 2, 11)])
 def test_a_character_takes_as_long_as_its_bits(parity, stop_bits, bits):
     assert SerialSettings(9600, parity, stop_bits).character_s == pytest.approx(bits / 9600)
 

@@ -28,6 +28,7 @@ from robolink.protocols.mailbox import (
     encode_slot,
     kinematics_word,
 )
+from tests._rows import each_row
 
 UINT = st.integers(0, 0xFFFF)
 UDINT = st.integers(0, 0xFFFFFFFF)
@@ -143,7 +144,7 @@ def test_the_answer_words_have_three_readings():
     )
 
 
-@pytest.mark.parametrize("words", [(), (0,) * 23, (65536,) + (0,) * 23])
+@each_row("words", [(), (0,) * 23, (65536,) + (0,) * 23])
 def test_an_answer_of_another_size_cannot_be_made(words):
     with pytest.raises(BlockError):
         Answer(words)

@@ -50,6 +50,7 @@ from robolink.procedures import LookPlan, MeasurementContext, TouchPlan
 from robolink.runner import Ask, Confirm, Look, Move, Notify, Seek, TeachPrompt, TouchedAt
 from robolink.stations import CameraStation, Station, StationKind
 from robolink.testing import PaperCell
+from tests._rows import each_row
 
 # The reference for one touch of the next nozzle, and the result of a wrong answer.
 
@@ -106,7 +107,7 @@ def test_a_stated_scatter_counts_before_that_of_the_last_touch(controller):
         assert solver.sigma_mm == used
 
 
-@pytest.mark.parametrize(("full_mm", "changes"), [(0.03, 3), (0.03, 0), (0.08, 0), (0.08, 4)])
+@each_row(("full_mm", "changes"), [(0.03, 3), (0.03, 0), (0.08, 0), (0.08, 4)])
 def test_how_many_changes_are_left_is_what_the_changes_themselves_say(full_mm, changes):
     limits, sigma_mm = NeedleLimits(tolerance_mm=0.1, max_changes=6), 0.02
     chain = NeedleChain(math.hypot(full_mm, sigma_mm) if changes else full_mm, changes, full_mm)
@@ -269,7 +270,7 @@ def test_an_edge_is_found_where_the_switch_goes_over():
     assert cell.here == found
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("number", "falling", "code", "stands_mm"),
     [(5, False, "edge_passed", 20.0), (6, False, "no_edge", 10.0), (6, True, "edge_passed", 20.0)],
 )
@@ -329,7 +330,7 @@ class Leaves:
         return "q"
 
 
-@pytest.mark.parametrize("method", SOURCES)
+@each_row("method", SOURCES)
 def test_tool_zero_is_selected_before_a_touch_is_asked_for(method):
     source = SOURCES[method]
     with SimpleController(SimpleMachine({1: STORED})) as controller:

@@ -21,6 +21,7 @@ from robolink.messages import joined, plain, spoken, tr
 from robolink.pose_tables.values import OpenQuestion, unclear
 from robolink.remedy_words import RemedyWord, remedy_word, speaking
 from robolink.timing import local_label
+from tests._rows import each_row
 
 # Every sentence goes through one function.
 
@@ -76,7 +77,7 @@ def marked():
     messages.install(None)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "language"),
     [
         *[(name, "zh") for name in ("zh", "zh_CN", "zh-Hans", "Chinese_China.936", "ZH_cn.GBK")],
@@ -169,7 +170,7 @@ def test_no_blank_stands_behind_a_chinese_full_stop():
     assert joined(" ", ("", "Moved.")) == " Moved."
 
 
-@pytest.mark.parametrize(
+@each_row(
     "joins",
     [
         lambda: advise_emergency_stop(ConnectError("No answer.", remedy=tr("Check it."))),

@@ -17,6 +17,7 @@ from robolink_simulators.epson.spel import Interpreter
 from robolink.errors import LocalProtocolError
 from robolink.model import Hand, Pose
 from robolink.protocols import spel
+from tests._rows import each_row
 
 # Till and Find: the statements sent, and their effect in a command window.
 
@@ -77,7 +78,7 @@ def test_the_statements_are_written_as_documented():
     assert spel.print_input(65535) == "Print Sw(65535)"
 
 
-@pytest.mark.parametrize("bit", [-1, 65536, True])
+@each_row("bit", [-1, 65536, True])
 def test_an_input_that_cannot_exist_is_not_written(bit):
     with pytest.raises(LocalProtocolError, match="An input"):
         spel.move_till(TARGET, bit, on=True, six_axes=False)

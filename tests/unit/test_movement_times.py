@@ -14,6 +14,7 @@ from robolink.controllers.epson.arms.models import ArmModel, arm_of
 from robolink.controllers.movement_time import ramped_s
 from robolink.controllers.softmotion.group import SoftMotionTimes
 from robolink.model import Hand, MotionProfile, Path, Pose
+from tests._rows import each_row
 
 VENDOR = [model for model in robots() if model.evidence is Evidence.VENDOR]
 SECOND_HAND = [model for model in robots() if model.evidence is not Evidence.VENDOR]
@@ -54,7 +55,7 @@ def way(end, profile=GO, *, length_mm=0.0, turn_deg=0.0, start=HERE):
     return Way(length_mm, turn_deg, start, end, profile)
 
 
-@pytest.mark.parametrize("model", VENDOR, ids=lambda one: one.name)
+@each_row("model", VENDOR)
 def test_a_robot_of_the_makers_files_is_known_by_its_name(model):
     arm = known(model.name.lower())
     assert arm.lengths_mm == model.lengths_mm
@@ -63,7 +64,7 @@ def test_a_robot_of_the_makers_files_is_known_by_its_name(model):
     assert arm.hangs is model.hangs
 
 
-@pytest.mark.parametrize("model", SECOND_HAND, ids=lambda one: one.name)
+@each_row("model", SECOND_HAND)
 def test_of_other_robots_a_cell_file_states_the_speeds(model):
     assert arm_of(model.name) is None
     stated = JointRates(model.top_speed, model.top_speed)
@@ -71,7 +72,7 @@ def test_of_other_robots_a_cell_file_states_the_speeds(model):
     assert arm_of("N2-A450S", stated) is None
 
 
-@pytest.mark.parametrize(
+@each_row(
     "name", ["GX8-C652S", "GX4-C251C", "RS4-C351S", "C8-C901S", "C8-C901SR", "CX4-A601S", "T6-602S"]
 )
 def test_joints_move_by_what_the_simulated_arm_moves_them(name):

@@ -10,6 +10,7 @@ from robolink.errors import ConfigError, RejectedError, RemoteProtocolError
 from robolink.protocols.mailbox import Command, Opcode, encode_command
 from robolink.transport import open_mailbox_link, open_opcua, parse_url, told_to
 from robolink.transport._mailbox_link import is_stop
+from tests._rows import each_row
 from tests.unit._opcua_far_end import FarEnd, symbol
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def test_a_node_is_named_by_its_id_or_by_its_way(client: "OpcuaClient") -> None:
         client.describe("ns=4;s=|var|none")
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         "i=2253",
@@ -79,7 +80,7 @@ def test_a_value_that_does_not_fit_its_node_is_not_sent(
     assert opcua_served.value("tool") == before
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("kind", "least", "most"),
     [
         ("SByte", -128, 127),

@@ -24,6 +24,7 @@ from robolink.timing import NS_PER_S, SystemClock
 from robolink.transport import MailboxLink, open_mailbox_link, open_opcua
 from robolink.transport.opcua import errors
 from robolink.transport.opcua.mailbox import OpcuaMailboxLink
+from tests._rows import each_row
 from tests.faults._bending_relay import BendingRelay
 from tests.unit._opcua_far_end import FarEnd, symbol
 
@@ -149,7 +150,7 @@ def test_answers_byte_by_byte_are_whole(opcua_served: FarEnd) -> None:
         assert link.read_response() == RESPONSE
 
 
-@pytest.mark.parametrize("place", range(0, 60, 7))
+@each_row("place", range(0, 60, 7))
 def test_a_damaged_answer_ends_the_link_or_is_the_right_one(
     opcua_served: FarEnd, place: int
 ) -> None:
@@ -172,7 +173,7 @@ def test_a_damaged_answer_ends_the_link_or_is_the_right_one(
             return
 
 
-@pytest.mark.parametrize("torn", [1, 2, 3])
+@each_row("torn", [1, 2, 3])
 def test_a_response_of_two_cycles_is_read_thrice_at_most_whatever_its_words(
     opcua_served: FarEnd, torn: int
 ) -> None:
@@ -332,7 +333,7 @@ def test_a_value_that_the_server_doubts_is_none(opcua_served: FarEnd) -> None:
         assert client.read([symbol("flag"), symbol("real")]) == (False, 1.5)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "write", "expected"),
     [
         ("BadTypeMismatch", True, RejectedError),

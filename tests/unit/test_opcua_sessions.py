@@ -15,6 +15,7 @@ from robolink.errors import (
     TransportClosedError,
     TransportTimeoutError,
 )
+from tests._rows import each_row
 from tests.unit._scripted_opcua import (
     NODE,
     VALUES,
@@ -40,7 +41,7 @@ def named(value: object) -> str | None:
     return "answer" if isinstance(value, bytes) else None
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("at", "answer", "expected", "words"),
     [
         (HELLO, told_error("BadTcpServerTooBusy"), ConnectError, "takes no more clients"),
@@ -50,7 +51,6 @@ def named(value: object) -> str | None:
         (LOGIN, fault(3, "BadSecurityChecksFailed"), RejectedError, "BadSecurityChecksFailed"),
         (LOGIN, b"", ConnectError, "nobody opens a session"),
     ],
-    ids=named,
 )
 def test_a_server_that_opens_no_session_says_why(at, answer, expected, words):
     transport = scripted({at: answer})
@@ -61,7 +61,7 @@ def test_a_server_that_opens_no_session_says_why(at, answer, expected, words):
     assert len(transport.sent) == at + 1
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("answer", "expected", "stays"),
     [
         (fault(6, "BadUserAccessDenied"), RejectedError, True),
@@ -74,7 +74,6 @@ def test_a_server_that_opens_no_session_says_why(at, answer, expected, words):
         (told_error("BadNotWritable"), TransportBrokenError, False),
         (b"", TransportTimeoutError, False),
     ],
-    ids=named,
 )
 def test_only_a_refusal_says_that_a_write_was_not_done(answer, expected, stays):
     transport = scripted({WRITE: answer})
@@ -87,15 +86,14 @@ def test_only_a_refusal_says_that_a_write_was_not_done(answer, expected, stays):
     assert len(transport.sent) == WRITE + 1
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("came", "expected", "words"),
     [
         (told_error("BadNotWritable"), TransportBrokenError, "BadNotWritable"),
         (dialogue()[WRITE], RemoteProtocolError, "MSG"),
     ],
-    ids=["error", "answer"],
 )
-@pytest.mark.parametrize("at_once", [False, True])
+@each_row("at_once", [False, True])
 def test_what_came_while_idle_is_noticed_before_anything_is_sent(came, expected, words, at_once):
     """At once: in one piece with the answer before it."""
     right = dialogue()[READ]
@@ -133,7 +131,7 @@ def test_the_status_of_the_node_counts(status, expected):
         client.write(NODE, VALUES)
 
 
-@pytest.mark.parametrize("session_ms", [0.0, float("nan"), float("inf"), 86_400_000.0])
+@each_row("session_ms", [0.0, float("nan"), float("inf"), 86_400_000.0])
 def test_a_server_that_grants_any_time_is_held_to_ours(session_ms):
     transport = scripted({}, session_ms=session_ms, lifetime_ms=0)
     client = connected(transport)
@@ -167,8 +165,8 @@ def test_a_number_that_no_double_holds_is_not_sent():
     assert len(transport.sent) == WRITE + 1
 
 
-@pytest.mark.parametrize("kind", [b"\x80", b"\xc0"])
-@pytest.mark.parametrize("count", [b"\xff\xff\xff\x7f", b"\xfe\xff\xff\xff"])
+@each_row("kind", [b"\x80", b"\xc0"])
+@each_row("count", [b"\xff\xff\xff\x7f", b"\xfe\xff\xff\xff"])
 def test_an_array_of_two_thousand_million_nulls_is_not_taken_apart(kind, count):
     array = b"\x8b\x06\x00\x00\x00"
     right = dialogue()[READ]

@@ -19,6 +19,7 @@ from robolink.register_maps import (
     load_plc_map,
 )
 from robolink.register_maps._drafts import component_of
+from tests._rows import each_row
 
 # Map files: every fault is reported with the path of its key.
 
@@ -53,7 +54,7 @@ def said(problems):
     return {problem.where: problem.what for problem in problems}
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@each_row("path", EXAMPLES)
 def test_the_examples_are_right(path):
     assert check_map(path) == ()
 
@@ -198,7 +199,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
+@each_row("case", BAD)
 def test_what_is_wrong_is_told_with_its_path(write, case):
     text, where, what = BAD[case]
     path = write(text)
@@ -244,7 +245,7 @@ def draft_of(tmp_path, text):
     return draft_from_csv(path)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "found"),
     [
         ("GVL.T1.x", (1, "x", "")),
@@ -272,7 +273,7 @@ def test_names_that_plc_people_write_are_understood(name, found):
     assert component_of(name) == found
 
 
-@pytest.mark.parametrize(
+@each_row(
     "name",
     [
         *("OldTool1_X", "oldTool1_X", "cmdTool1X", "Tool1_XY", "Tool1.Speed", "Tool1_X_Act"),

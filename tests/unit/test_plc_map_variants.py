@@ -12,6 +12,7 @@ from robolink_simulators.hosting import modbus_frames as frames
 from robolink.errors import RejectedError, ToolError
 from robolink.model import ANY, ToolOffset
 from robolink.register_maps import Number, NumberType, RegisterTable
+from tests._rows import each_row
 from tests.unit._plc_bench import Bench
 
 # Maps that no example has: LREAL, swapped bytes, a flag for defined tools, read-only.
@@ -216,7 +217,7 @@ def test_f36_float32_is_equal_within_one_unit_in_the_last_place():
     assert after - stored == real.slack(stored)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("table", "address", "shown"),
     [
         (RegisterTable.HOLDING, 0, "40001"),

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
 from robolink.model import Hand
 from robolink.pose_tables import ReadingChoices, read_poses
+from tests._rows import each_row
 
 PLACE, ANGLES = (405.8, -62.9, 251.6), (40.0, 12.0, -172.0)
 TURNED = Rotation.from_euler("ZYX", ANGLES, degrees=True)
@@ -109,7 +110,7 @@ FORMS = {
 }
 
 
-@pytest.mark.parametrize("form", FORMS)
+@each_row("form", FORMS)
 def test_a_pose_is_read_as_its_maker_defines_it(read, form):
     (pose,) = read(FORMS[form]).poses
     assert pose.coordinates()[:3] == pytest.approx(PLACE, abs=1e-6)
@@ -174,7 +175,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("text", REFUSED, ids=lambda text: repr(text[:20]))
+@each_row("text", REFUSED)
 def test_what_is_no_pose_of_its_maker_is_refused(read, text):
     with pytest.raises(ConfigError) as caught:
         read(text)
@@ -256,7 +257,7 @@ SPELLED = {
 }
 
 
-@pytest.mark.parametrize("form", SPELLED)
+@each_row("form", SPELLED)
 def test_a_pose_is_read_as_it_is_printed(read, form):
     text, choices = SPELLED[form]
     (pose,) = read(text, **choices).poses
@@ -330,7 +331,7 @@ ASKED_OR_REFUSED = {
 }
 
 
-@pytest.mark.parametrize("case", ASKED_OR_REFUSED)
+@each_row("case", ASKED_OR_REFUSED)
 def test_what_is_not_whole_is_refused_by_its_line(read, case):
     text, why = ASKED_OR_REFUSED[case]
     with pytest.raises((ConfigError, CalibrationError)) as caught:
@@ -364,7 +365,7 @@ COMMENTED = {
 }
 
 
-@pytest.mark.parametrize("maker", COMMENTED)
+@each_row("maker", COMMENTED)
 def test_a_pose_in_a_comment_is_counted_and_one_behind_a_sign_alone_refused(read, maker):
     text, sign = COMMENTED[maker]
     before, _, behind = text.partition("{}")

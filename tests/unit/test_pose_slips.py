@@ -12,6 +12,7 @@ import pytest
 
 from robolink.pose_tables import ReadingChoices
 from robolink.pose_tables.encoding import decoded
+from tests._rows import each_row
 from tests.unit.pose_seeds import SEEDS
 from tests.unit.pose_slips import outcome, read_as, slips_of
 
@@ -42,7 +43,7 @@ def judged(folder, name, text, options, slips):
     return silent, unplaced, counted
 
 
-@pytest.mark.parametrize("name", SEEDS)
+@each_row("name", SEEDS)
 def test_a_slip_changes_no_pose_in_silence(tmp_path, name):
     text, options = SEEDS[name]
     slips = random.Random(name).sample(list(slips_of(text)), SAMPLE)

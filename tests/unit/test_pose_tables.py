@@ -15,6 +15,7 @@ from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
 from robolink.model import Hand, Pose
 from robolink.pose_tables import RULES, ReadingChoices, read_poses
 from robolink.pose_tables.orientation import order_for
+from tests._rows import each_row
 
 # Tables of poses: columns, units, separators and encodings; what is asked, what is refused.
 
@@ -79,7 +80,7 @@ LAYOUTS = {
 }
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@each_row("layout", LAYOUTS)
 def test_a_table_is_read_whatever_its_layout(read, layout):
     assert read(LAYOUTS[layout]).poses == FLAT
 
@@ -121,7 +122,7 @@ def quaternion_table(header, order, scale=1.0):
     return f"{header}\n{','.join([*numbers, *(QUATERNION[place] for place in order)])}\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "choices"),
     [
         (quaternion_table("x,y,z,qw,qx,qy,qz", (0, 1, 2, 3)), {}),
@@ -157,7 +158,7 @@ EULER = {
 
 
 @pytest.mark.fault("F40")
-@pytest.mark.parametrize("name", EULER)
+@each_row("name", EULER)
 def test_each_rule_is_the_product_of_the_matrices_that_its_name_stands_for(read, name):
     axes, letters = EULER[name]
     angles = dict(zip(letters.split(), (40.0, 12.0, -172.0), strict=True))
@@ -205,7 +206,7 @@ ASKED = {
 }
 
 
-@pytest.mark.parametrize("case", ASKED)
+@each_row("case", ASKED)
 def test_what_a_file_does_not_say_is_asked_and_not_guessed(read, case):
     text, about = ASKED[case]
     with pytest.raises(AmbiguousPosesError, match=r"poses\.txt") as caught:
@@ -247,7 +248,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("text", REFUSED, ids=lambda text: repr(text[:20]))
+@each_row("text", REFUSED)
 def test_a_file_that_is_no_list_of_poses_is_refused_with_its_line(read, text):
     with pytest.raises(ConfigError, match=r"poses\.txt") as caught:
         read(text)
@@ -263,14 +264,14 @@ def test_what_is_no_finite_number_is_named_with_its_line(read, value):
     assert caught.value.code == "non_finite"
 
 
-@pytest.mark.parametrize("value", ["NaN", "Infinity", '"abc"', "true", "1e999"])
+@each_row("value", ["NaN", "Infinity", '"abc"', "true", "1e999"])
 def test_in_json_it_is_named_with_its_pose(read, value):
     text = f'[{{"x_mm": 1, "y_mm": 2, "u_deg": 3}}, {{"x_mm": 1, "y_mm": 2, "u_deg": {value}}}]'
     with pytest.raises(CalibrationError, match="pose 2: u_deg is"):
         read(text)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "choices", "why"),
     [
         ("x_mm,y_mm,u_deg\n1,20,3\n", {"length": "m"}, "it says mm itself"),
@@ -396,7 +397,7 @@ EXPECTED = json.loads(LIST.read_text(encoding="utf-8"))["files"] if LIST.is_file
 @pytest.mark.skipif(
     not LIST.is_file(), reason="the tables lie beside the repository and are not there"
 )
-@pytest.mark.parametrize("name", EXPECTED)
+@each_row("name", EXPECTED)
 def test_a_table_holds_the_poses_that_it_stands_for(name):
     wanted = EXPECTED[name]
     found = read_poses(DATA / name, ReadingChoices(**wanted["options"]))
@@ -427,7 +428,7 @@ def test_without_what_it_does_not_say_a_table_is_refused_with_that_question(name
     assert set(caught.value.asks) == set(EXPECTED[name]["options"])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("rule", "letters", "order"),
     [
         ("epson", "c a b", (1, 2, 0)),  # another maker's letters, from the first matrix to the last

@@ -12,6 +12,7 @@ from robolink.protocols.spel import (
     split_before_point,
     split_numbers,
 )
+from tests._rows import each_row
 
 GAPS = st.sampled_from([" ", "  ", ", ", ",", "; ", "\t", "", "/", " 1 "])
 NUMBERS = st.one_of(
@@ -49,9 +50,7 @@ def test_a_point_after_numbers_is_read_as_it_was_printed(gap, numbers, own, blan
     assert spel.parse_point(told[1]) == spel.parse_point(POINT)
 
 
-@pytest.mark.parametrize(
-    "other", ["1 1 0 5 20", "1 1 0 5 20 98", "7", "", "99", "199", "1 1 0 5 2099"]
-)
+@each_row("other", ["1 1 0 5 20", "1 1 0 5 20 98", "7", "", "99", "199", "1 1 0 5 2099"])
 def test_an_answer_without_the_own_number_at_its_end_is_another_s(other):
     assert before_last_number(other, 99) is None
 

@@ -47,6 +47,7 @@ from robolink.runner import foreseen_steps
 from robolink.testing import PaperCell
 from robolink.transaction import Wanted, change_tools
 from robolink.version import VERSION
+from tests._rows import each_row
 
 # A deprecated public name works for one more version, and names its successor.
 
@@ -79,7 +80,7 @@ def the_new(path):
     return getattr(importlib.import_module(home), name)
 
 
-@pytest.mark.parametrize(("package", "name", "new"), ROWS, ids=IDS)
+@each_row(("package", "name", "new"), ROWS)
 def test_an_old_name_is_the_same_thing_and_warns_once_where_it_is_used(package, name, new):
     for act in (
         lambda: imported(package, name),
@@ -178,7 +179,7 @@ def test_sentences_that_are_yielded_have_the_sign_too():
     assert len(caught) == 1
 
 
-@pytest.mark.parametrize(
+@each_row(
     "name",
     [
         "accurate_sentence",
@@ -361,14 +362,14 @@ WIDTHS = [np.float16, np.float32, np.float64, np.longdouble, np.array]
 WIDTHS += [getattr(np, f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)]
 
 
-@pytest.mark.parametrize("width", WIDTHS, ids=lambda width: width.__name__)
+@each_row("width", WIDTHS)
 def test_a_number_of_any_width_becomes_one_of_python(width):
     offset, pose = ToolOffset(width(3), 1), Pose(1, width(3), 0, 0)
     assert (offset, pose) == (ToolOffset(3, 1), Pose(1, 3, 0, 0))
     assert {type(it) for it in (*offset.components(), *pose.coordinates())} == {int, float}
 
 
-@pytest.mark.parametrize(
+@each_row(
     "value",
     [np.float32("nan"), np.float64("inf"), "1", None, 1j, True, np.True_, np.zeros((99, 99))],
 )
@@ -426,7 +427,7 @@ TAKES: dict[str, Callable[[Any], object]] = {
 }
 
 
-@pytest.mark.parametrize("argument", TAKES)
+@each_row("argument", TAKES)
 def test_what_is_no_value_is_refused_by_the_name_of_its_argument(argument):
     for given in MISTAKEN:
         with pytest.raises(ConfigError) as caught:
@@ -439,7 +440,7 @@ MOVING = ("measure_", "verify_b", "learn_", "trace_")
 PROCEDURES = [it for it in sorted(vars(methods)["__all__"]) if it.startswith(MOVING)]
 
 
-@pytest.mark.parametrize("name", PROCEDURES)
+@each_row("name", PROCEDURES)
 def test_a_procedure_refuses_at_its_call_what_would_show_once_the_robot_has_moved(name):
     procedure = getattr(methods, name)
     asked = inspect.signature(procedure).parameters.values()
@@ -477,7 +478,7 @@ def test_nothing_is_sent_for_a_box_a_profile_or_a_change_that_is_none(controller
     assert controller.exchanges == sent
 
 
-@pytest.mark.parametrize("url", [5, None, b"epson+tcp://192.168.0.1"])
+@each_row("url", [5, None, b"epson+tcp://192.168.0.1"])
 def test_what_is_neither_url_nor_controller_is_refused(url):
     with pytest.raises(ConfigError, match="neither a URL nor a controller"):
         robolink.connect(url)

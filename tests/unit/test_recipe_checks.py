@@ -5,6 +5,7 @@ import tomllib
 import pytest
 
 from robolink.recipe._loading import _checked
+from tests._rows import each_row
 
 PIN = """\
 schema = "robolink/recipe/1"
@@ -73,14 +74,12 @@ def with_(text, header, *lines):
     return f"{text}{header}\n{body}\n"
 
 
-@pytest.mark.parametrize(
-    "text", [PIN, POINTS, BEAMS, TOUCH, with_(ANGLES, "[source]", "count = 3")]
-)
+@each_row("text", [PIN, POINTS, BEAMS, TOUCH, with_(ANGLES, "[source]", "count = 3")])
 def test_the_recipes_that_are_varied_here_are_right(text):
     assert problems(text) == {}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "where", "what"),
     [
         (with_(PIN, "[source]", "count = 4"), "source.count", "is not known"),
@@ -122,7 +121,7 @@ def test_the_angles_are_those_of_the_method(text, where, what):
     assert found[where].startswith(what)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "where", "what"),
     [
         (BEAMS.replace("= 88", "= 15"), "source.beams", "must cross at 20 degrees"),
@@ -186,7 +185,7 @@ def test_crossings_that_check_each_other_may_end_early_and_be_made_again():
     assert problems(with_(stated, "[source]", *course)) == {}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "where", "what"),
     [
         (TOUCH.replace('"measured"', '"kept"'), "z", 'must be "measured"'),
@@ -238,7 +237,7 @@ number = 3
 ONE_LOOK = "turns_deg = [0]"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "where", "what"),
     [
         (CAMERA.replace('"kept"', '"measured"'), "z", 'cannot be "measured" by a camera'),
@@ -287,7 +286,7 @@ MARKS = BOARD.replace("spacing_mm = 40", "fiducials_mm = [[20, 0], [-20, 0], [-2
 PIVOT = PIN.replace('"two-pose"', '"pivot"')
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         AFFINE,
@@ -305,7 +304,7 @@ def test_what_these_kinds_can_measure_is_accepted(text):
     assert problems(judged) == {}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "where", "what"),
     [
         (AFFINE.replace('"kept"', '"measured"'), "z", 'cannot be "measured" by a camera'),
@@ -372,7 +371,7 @@ def test_a_tool_has_no_points_where_beams_measure_it():
     assert list(found) == ["tools#1.points"]
 
 
-@pytest.mark.parametrize("angles", ["0, 120, 240", "0, -15, 15", "0, 170, 340"])
+@each_row("angles", ["0, 120, 240", "0, -15, 15", "0, 170, 340"])
 def test_angles_that_spread_are_accepted(angles):
     assert problems(with_(ANGLES, "[source]", f"angles_deg = [{angles}]")) == {}
 
@@ -414,7 +413,7 @@ def test_each_tool_stands_there_once():
     assert problems(PIN + "[[tools]]\nnumber = 4\n") == {}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("method", "points", "where"),
     [
         ("two-pose", "points = [1, 2, 3]", "tools#1.points"),
@@ -445,7 +444,7 @@ def test_points_mean_nothing_where_a_person_measures():
     assert list(problems(PIN + "points = [1, 2]\n")) == ["tools#1.points"]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "where"),
     [
         (with_(POINTS, "[poses]", f"safe = {at(1, 2)}"), "poses"),
@@ -472,7 +471,7 @@ def test_a_drift_is_judged_only_where_one_is_measured():
     assert list(problems("verify = false\n" + text)) == ["tolerances.drift_mm"]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("approach", "inside"),
     [((60, -30), True), ((61, 0), False), ((0, -31), False), ((0, 51), False), ((-60, 50), True)],
 )
@@ -482,16 +481,14 @@ def test_from_the_safe_pose_every_pose_of_a_tool_is_within_the_box(approach, ins
     assert list(problems(text)) == ([] if inside else ["tools#1.approach"])
 
 
-@pytest.mark.parametrize(
-    ("retreat", "inside"), [((120, 80), True), ((121, 0), False), ((0, 81), False)]
-)
+@each_row(("retreat", "inside"), [((120, 80), True), ((121, 0), False), ((0, 81), False)])
 def test_without_a_safe_pose_one_box_can_hold_all_poses(retreat, inside):
     text = PIN + f"approach = {at(0, 0)}\nretreat = {at(*retreat)}\n[box]\nsideways_mm = 60\n"
     assert list(problems(text)) == ([] if inside else ["box"])
 
 
-@pytest.mark.parametrize("key", ["rms_mm", "max_mm"])
-@pytest.mark.parametrize("text", [PIN, POINTS])
+@each_row("key", ["rms_mm", "max_mm"])
+@each_row("text", [PIN, POINTS])
 def test_residuals_of_two_poses_are_not_judged_and_the_reason_is_told(text, key):
     found = problems(with_(text, "[tolerances]", f"{key} = 0.1"))
     assert list(found) == [f"tolerances.{key}"]
@@ -516,7 +513,7 @@ def test_the_interval_of_many_angles_comes_from_the_residuals_as_well():
     assert problems(with_(text, "[tolerances]", "interval_mm = 0.1")) == {}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "reached"),
     [
         (PIN, "0.139"),  # 1.96 x 0.1 / sqrt 2
@@ -548,8 +545,8 @@ def test_attempts_belong_to_measuring_again():
     assert (recipe and recipe.attempts, found) == (5, ())
 
 
-@pytest.mark.parametrize("kind", ["prompts", "outputs"])
-@pytest.mark.parametrize(
+@each_row("kind", ["prompts", "outputs"])
+@each_row(
     ("at_", "tool", "what"),
     [
         ("before_measure", 3, None),
@@ -573,14 +570,14 @@ def test_an_output_may_be_switched_after_the_measurement_of_one_tool():
     assert problems(with_(PIN, "[[outputs]]", *lines)) == {}
 
 
-@pytest.mark.parametrize("answer", ["nozzle", "lot"])
-@pytest.mark.parametrize("moment", ["before_write", "end"])
+@each_row("answer", ["nozzle", "lot"])
+@each_row("moment", ["before_write", "end"])
 def test_a_nozzle_and_its_lot_are_asked_before_they_go_on_record(answer, moment):
     lines = (f'at = "{moment}"', 'text = "?"', f'answer = "{answer}"')
     assert list(problems(with_(PIN, "[[prompts]]", *lines))) == ["prompts#1.at"]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("first", "second", "twice"),
     [("", "", True), ("tool = 3", "tool = 3", True), ("", "tool = 3", True), (None, "", False)],
 )

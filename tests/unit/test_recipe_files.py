@@ -31,6 +31,7 @@ from robolink.methods import (
 from robolink.procedures import TWO_ANGLES_DEG, LookPlan, TouchPlan
 from robolink.recipe import LoadedRecipe, Output, Prompt, Recipe, check_recipe, load_recipe
 from robolink.recipe._loading import _checked
+from tests._rows import each_row
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
@@ -64,7 +65,7 @@ def problems(tmp_path):
     return look
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@each_row("path", EXAMPLES)
 def test_every_example_loads(path):
     assert check_recipe(path) == ()
     loaded = load_recipe(path)
@@ -204,7 +205,7 @@ def test_no_value_can_be_changed_after_loading():
         recipe.tolerances.jump_mm = 100
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("key", "words"),
     [
         ("basis", 'write "difference" where taught points have to stay right'),
@@ -222,7 +223,7 @@ def test_a_required_key_that_is_missing_is_explained(problems, key, words):
     assert words in found[key]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("lines", "where", "what"),
     [
         (
@@ -344,8 +345,10 @@ def test_pydantic_waits_for_the_first_recipe():
     code = (
         "import sys, robolink.recipe\n"
         "assert 'pydantic' not in sys.modules\n"
-        "robolink.recipe.Recipe\n"
-        "assert 'pydantic' in sys.modules"
+        "sys.modules['pydantic'] = None\n"  # whoever imports it now fails
+        "try:\n    robolink.recipe.Recipe\n"
+        "except ImportError:\n    sys.exit()\n"
+        "sys.exit('Recipe did without pydantic')"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=20)
 

@@ -20,6 +20,7 @@ from robolink.errors import ConfigError, DeclinedError, LimitError
 from robolink.model import Pose, ToolOffset
 from robolink.recipe import Answers, LoadedRecipe, Recipe, beyond, load_recipe, require_answers
 from robolink.recipe._loading import _checked
+from tests._rows import each_row
 
 # Requests of a recipe that a kind of controller does not support: not offered, and refused at once.
 
@@ -51,8 +52,8 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("case", CASES)
+@each_row("kind", KINDS)
+@each_row("case", CASES)
 def test_what_a_kind_cannot_do_is_told_and_nothing_else(case, kind):
     recipe, refused = CASES[case]
     able: Any = capabilities_of_kind(kind)
@@ -68,7 +69,7 @@ def test_another_camera_and_a_run_that_writes_nothing_ask_for_less():
     assert beyond(recipe, able, other_sensor=True, writes=False) == ()
 
 
-@pytest.mark.parametrize("case", ["taught", "own camera", "outputs"])
+@each_row("case", ["taught", "own camera", "outputs"])
 def test_a_run_refuses_by_the_same_sentences_before_anything_is_asked(case):
     recipe, _ = CASES[case]
     nobody: Any = None
@@ -164,7 +165,7 @@ def recipe(z, more=""):
     return found
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("z", "more", "answers"),
     [
         ("kept", "", Answers(yes=True)),
@@ -176,7 +177,7 @@ def test_what_was_answered_beforehand_is_not_missing(z, more, answers):
     require_answers(answers, recipe(z, more))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("z", "more", "answers", "missing"),
     [
         ("kept", "", Answers(), "yes=True"),
@@ -219,7 +220,7 @@ def proposal_of(basis, z, typed=None):
     return proposed(recipe, Proposal(1, STORED, result), reference=reference, typed_z_mm=typed)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("basis", "z", "written"),
     [
         ("absolute", "measured", (12.5, -3.9, -19.9)),

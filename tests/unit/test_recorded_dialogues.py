@@ -16,6 +16,7 @@ from robolink.transport import (
     format_dialogue,
     parse_dialogues,
 )
+from tests._rows import each_row
 
 # Recorded dialogues as text.
 
@@ -68,7 +69,7 @@ def test_pieces_of_one_direction_are_joined_and_a_login_stays_apart():
 OPENING = '{"schema": "robolink/dialogue/1", "controller": "c", "began_at": "t"}\n'
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "line"),
     [
         ("", 1),
@@ -118,7 +119,7 @@ def played(*pieces, dialogue=RECORDED):
     return device, link, b"".join(answers)
 
 
-@pytest.mark.parametrize("login", [b"$Login,any password\r\n", b"$login,\r", b"$Login,x\n"])
+@each_row("login", [b"$Login,any password\r\n", b"$login,\r", b"$Login,x\n"])
 def test_the_same_requests_get_the_same_answers_with_any_password(login):
     device, link, answers = played(login, b"$GetStatus\r\n", b"")
     assert answers == b"#Login,0\r\n" + STATUS
@@ -126,7 +127,7 @@ def test_the_same_requests_get_the_same_answers_with_any_password(login):
     assert link.closed
 
 
-@pytest.mark.parametrize("cut", range(1, 12))
+@each_row("cut", range(1, 12))
 def test_how_the_stream_is_cut_does_not_matter(cut):
     stream = b"$Login,secret\r\n$GetStatus\r\n"
     device, _, answers = played(stream[:cut], *(bytes([b]) for b in stream[cut:]))

@@ -29,6 +29,7 @@ from robolink.report.pictures.drawing import dot_names, step_down, step_up
 from robolink.report.pictures.looks import LookCircle, LookPicture, look_markup
 from robolink.report.pictures.plans import pose_drawings, tip_drawings
 from robolink.report.pictures.residuals import fit_drawings, interval_ellipse, order_drawings
+from tests._rows import each_row
 
 # The report as a page: well formed, escaped, self-contained, and equal to its numbers.
 
@@ -123,7 +124,7 @@ EVERY = {
 }
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each_row("name", EVERY)
 def test_a_page_is_well_formed_and_needs_nothing_beside_itself(name):
     text = render(EVERY[name])
     page = Page(text)
@@ -176,7 +177,7 @@ def test_where_the_tip_moves_equally_far_at_every_point_none_is_called_the_large
     assert "At every point: 0.500 mm. Only its direction turns with U." in page.text
 
 
-@pytest.mark.parametrize("name", ["50 points", "one point", "a huge shift"])
+@each_row("name", ["50 points", "one point", "a huge shift"])
 def test_arrows_are_as_long_as_the_stated_factor_says_and_stay_on_the_paper(name):
     made = EVERY[name]
     text = render(made)
@@ -260,7 +261,7 @@ OUTCOMES = {
 }
 
 
-@pytest.mark.parametrize("outcome", Outcome)
+@each_row("outcome", Outcome)
 def test_how_it_ended_stands_at_the_top(outcome):
     text = Page(render(report(outcome=outcome, ending="Because."))).text
     assert text.index(OUTCOMES[outcome]) < text.index("Because.") < text.index("controller epson")
@@ -445,9 +446,7 @@ def test_heights_have_no_picture_from_above_and_need_none():
 # Round numbers and names in the pictures of a report.
 
 
-@pytest.mark.parametrize(
-    ("value", "down", "up"), [(37.0, 30.0, 50.0), (0.72, 0.6, 1.0), (170.0, 150.0, 200.0)]
-)
+@each_row(("value", "down", "up"), [(37.0, 30.0, 50.0), (0.72, 0.6, 1.0), (170.0, 150.0, 200.0)])
 def test_a_scale_is_a_round_number_beside_the_value(value, down, up):
     assert step_down(value) == pytest.approx(down)
     assert step_up(value) == pytest.approx(up)

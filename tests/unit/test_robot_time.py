@@ -15,6 +15,7 @@ from robolink.methods import PointsSource
 from robolink.model import EntryKind, MotionProfile, NewEntry, Path, Pose, Signature, WorkBox
 from robolink.runner import Confirm, RobotTime, Runner, RunSettings
 from robolink.timing import AnswerTimes
+from tests._rows import each_row
 
 PARKED, START, PLACE = (Pose(x, 0, 50, 0, tool=0) for x in (0, 300, 400))
 
@@ -145,7 +146,7 @@ def test_a_run_in_which_something_was_repeated_is_not_recorded():
     assert not forecaster(link).forecast().changed
 
 
-@pytest.mark.parametrize("details", [{}, {"times": None}, {"times": {"schema": "a/1"}}])
+@each_row("details", [{}, {"times": None}, {"times": {"schema": "a/1"}}])
 def test_an_entry_of_another_form_is_passed_over(details):
     link = linked()
     run(link)

@@ -40,6 +40,7 @@ from robolink.runner import (
     yes_or_no,
 )
 from robolink.runner._jog_steps import typed_pose
+from tests._rows import each_row
 
 # Possible answers of a person, the forms of a jog step, and an end to every question.
 
@@ -85,17 +86,17 @@ def runner_with(controller, operator, *, below_mm=10.0):
     return Runner(controller, group, operator, RunSettings(box))
 
 
-@pytest.mark.parametrize("word", ["y", "YES", "j", "Ja", " y ", "是"])
+@each_row("word", ["y", "YES", "j", "Ja", " y ", "是"])
 def test_these_are_a_yes(word):
     assert yes_or_no(word) is True
 
 
-@pytest.mark.parametrize("word", ["n", "No", "nein", "NEIN", "否"])
+@each_row("word", ["n", "No", "nein", "NEIN", "否"])
 def test_these_are_a_no(word):
     assert yes_or_no(word) is False
 
 
-@pytest.mark.parametrize("word", ["", "4006381333931", "yy", "jo", "1", "ok"])
+@each_row("word", ["", "4006381333931", "yy", "jo", "1", "ok"])
 def test_anything_else_is_neither(word):
     assert yes_or_no(word) is None
 
@@ -117,7 +118,7 @@ def test_what_is_neither_is_asked_once_more_and_is_a_no_then(controller, lines, 
     assert len(typist.shown) == asked - 1
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "deltas"),
     [
         ("x + 0.1", {"x": 0.1}),
@@ -132,7 +133,7 @@ def test_a_step_is_understood_however_it_is_spaced_and_signed(text, deltas):
     assert parse_steps(text) == deltas
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     ["x0.1", "x+0.1\u00b2", "x+0.1234", "x+0.1.2", "x+1,  5", "+x1", "x+", "x+-1", "y"],
 )
@@ -144,7 +145,7 @@ def test_what_could_be_meant_otherwise_is_not_guessed(text):
         parse_steps(text)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "pointed"),
     [
         ("x+0,1", "x+0.1"),
@@ -160,7 +161,7 @@ def test_a_decimal_comma_is_refused_with_the_step_as_it_is_to_be_written(text, p
         parse_steps(text)
 
 
-@pytest.mark.parametrize("text", ["x+1 x+2", "z-5 z-5", "x+1 y-1 x-1"])
+@each_row("text", ["x+1 x+2", "z-5 z-5", "x+1 y-1 x-1"])
 def test_an_axis_that_is_there_twice_is_named(text):
     with pytest.raises(ConfigError, match=f"^{text[0]} appears twice\\. Nothing moved"):
         parse_steps(text)
@@ -295,7 +296,7 @@ HERE = Pose(300.0, 100.0, -60.0, 30.0, tool=0)
 SETTINGS = RunSettings(WorkBox(), max_jog_mm=5.0, max_jog_deg=10.0)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("steps", "path", "coordinates"),
     [
         ("x+5 y-5, z+0.1", Path.STRAIGHT, (305.0, 95.0, -59.9, 30.0)),
@@ -309,14 +310,14 @@ def test_where_steps_lead_and_that_a_turn_is_no_straight_move(steps, path, coord
     assert target.coordinates()[:4] == pytest.approx(coordinates)
 
 
-@pytest.mark.parametrize("steps", ["x+5.1", "x-5.1", "z-6", "u+10.5", "u-11", "x+1 y-7"])
+@each_row("steps", ["x+5.1", "x-5.1", "z-6", "u+10.5", "u-11", "x+1 y-7"])
 def test_a_step_too_long_is_refused_either_way(steps):
     with pytest.raises(LimitError):
         jog_target(HERE, steps, SETTINGS)
 
 
-@pytest.mark.parametrize("axis", "xyzu")
-@pytest.mark.parametrize("sign", "+-")
+@each_row("axis", "xyzu")
+@each_row("sign", "+-")
 def test_a_decimal_comma_is_refused_at_each_axis_and_said_how_to_write_it(axis, sign):
     """Taken for two steps it would move by the first digit alone."""
     with pytest.raises(ConfigError) as refused:
@@ -324,10 +325,9 @@ def test_a_decimal_comma_is_refused_at_each_axis_and_said_how_to_write_it(axis, 
     assert f"{axis}{sign}0.5" in refused.value.what
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     ["300.2 100 -60 30", "300 100 -60 31.5", "300 100 -60 30 1.5 0", "301.1 100 -60 30"],
-    ids=["outside the box", "turned too far", "leans too far", "too far away"],
 )
 def test_a_typed_pose_is_about_where_the_frame_is_and_in_its_box(text):
     settings = RunSettings(WorkBox(x_max_mm=300.1))
@@ -384,7 +384,7 @@ def test_what_is_not_written_has_no_moment_before_it():
     assert machine.read(1) == OLD
 
 
-@pytest.mark.parametrize("refuses", [Moment.START, Moment.BEFORE_MEASURE, Moment.BEFORE_WRITE])
+@each_row("refuses", [Moment.START, Moment.BEFORE_MEASURE, Moment.BEFORE_WRITE])
 def test_who_refuses_at_a_moment_before_the_write_keeps_the_old_value(refuses):
     machine = SimpleMachine({1: OLD})
     with pytest.raises(DeclinedError):
@@ -412,7 +412,7 @@ def proposal(offset, measured, z_from="kept"):
     return Proposal(1, BEFORE, result, z_from=z_from)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("measured", "z_from", "change_mm"),
     [
         (("z_mm",), "kept", 3.0),

@@ -12,6 +12,7 @@ from robolink.errors import CalibrationError, ConfigError, ConnectError, Transpo
 from robolink.methods import CameraAffineSource, CameraSource
 from robolink.model import TIP, Spot, SpotUnit, TipSensor
 from robolink.sensing import SENSORS_GROUP, open_sensor, scatter_of, seen_once, sensor_name
+from tests._rows import each_row
 from tests.contract._camera_cell import camera_model, camera_station, cell_of, run_source
 from tests.contract._sensor_cell import miss_mm
 
@@ -40,7 +41,7 @@ def test_a_finder_may_tell_how_wide_a_spot_is_and_how_sure_it_was():
     assert seen_once(Pictures([(3, 4)]), TIP, pictures=1) == Spot(3, 4)
 
 
-@pytest.mark.parametrize("radius_px", [math.nan, -1.0, 0.0])
+@each_row("radius_px", [math.nan, -1.0, 0.0])
 def test_a_radius_that_is_none_is_refused(radius_px):
     with pytest.raises(CalibrationError, match="radius") as refusal:
         seen_once(Pictures([(3, 4, radius_px)]), TIP, pictures=1)
@@ -105,7 +106,7 @@ def test_the_camera_is_closed_when_the_work_fails(plug_in):
     assert camera.closed
 
 
-@pytest.mark.parametrize("name", ["nobody", "", "://x", "a b", "nobody://x?y=1"])
+@each_row("name", ["nobody", "", "://x", "a b", "nobody://x?y=1"])
 def test_a_name_that_nothing_brings_is_refused_with_the_known_ones(name):
     with pytest.raises(CalibrationError) as refusal, open_sensor(name):
         pass
@@ -153,7 +154,7 @@ def test_a_picture_may_miss_the_tip_but_not_half_of_them():
         assert refusal.value.code == "tip_not_seen"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("mark", "found", "code"),
     [
         (TIP, [], "tip_not_seen"),
@@ -230,7 +231,7 @@ def test_numbers_that_are_none_are_refused(plug_in):
         assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("given", "shown"),
     [
         ("up-looking", "up-looking"),

@@ -19,6 +19,7 @@ from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import Point
 
 from robolink.model import Hand, Pose, ToolOffset
+from tests._rows import each_row
 
 S = 1_000_000_000
 T6 = find_robot("T6-602S")
@@ -320,7 +321,7 @@ def test_a_byte_is_eight_bits_with_the_lowest_first():
     assert bank.get_byte(1) == 0
 
 
-@pytest.mark.parametrize(
+@each_row(
     "use",
     [
         lambda bank: bank.get(16),

@@ -2,10 +2,10 @@
 
 from itertools import pairwise
 
-import pytest
 from robolink_simulators.hosting.fieldbus.canopen_node import LOOK_S, PERIOD_S, EventTimer
 
 from robolink.timing import NS_PER_S
+from tests._rows import each_row
 
 PERIOD_NS = round(PERIOD_S * NS_PER_S)
 LOOK_NS = round(LOOK_S * NS_PER_S)
@@ -21,7 +21,7 @@ def test_a_heartbeat_comes_with_its_period():
     assert due_at(range(0, 10 * PERIOD_NS, LOOK_NS)) == list(range(0, 10 * PERIOD_NS, PERIOD_NS))
 
 
-@pytest.mark.parametrize("times_slower", [3, 7, 25])
+@each_row("times_slower", [3, 7, 25])
 def test_a_heartbeat_is_late_by_one_look_at_most(times_slower):
     look_ns = times_slower * LOOK_NS
     found = due_at(range(0, 100 * PERIOD_NS, look_ns))

@@ -9,6 +9,7 @@ from robolink_simulators.epson.options import option_names, options_from_text
 from robolink.errors import ConfigError
 from robolink.model import Secret
 from robolink.protocols.epson_text import VariableType
+from tests._rows import each_row
 
 # The login and its duration, and the log's part of it.
 
@@ -328,7 +329,7 @@ def test_nothing_given_is_the_defaults():
     assert options_from_text({}) == EpsonOptions()
 
 
-@pytest.mark.parametrize("field", fields(EpsonOptions), ids=lambda field: field.name)
+@each_row("field", fields(EpsonOptions))
 def test_every_option_can_be_written_as_text(field):
     if field.name == "numbers":
         assert options_from_text({"numbers.aborted": "77"}).numbers.aborted == 77
@@ -358,7 +359,7 @@ def test_an_unknown_option_lists_the_known_ones():
         options_from_text({"colour": "red"})
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "text"),
     [
         ("terminator", "tab"),

@@ -19,6 +19,7 @@ from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.spel import Interpreter
 
+from tests._rows import each_row
 from tests.unit.test_sim_spel_motion import Cell
 from tests.unit.test_sim_spel_points import Window
 
@@ -150,9 +151,7 @@ def test_finedist_counts_mm_and_fine_puts_pulses_in_force_again():
     assert late.run("Print FineStatus, FineDist") == "0 0\r\n"
 
 
-@pytest.mark.parametrize(
-    "setting", ["Fine 5, 5, 5, 5", "FineDist 0.001", "Fine 5,5,5,5; Pulse 0,0,0,0"]
-)
+@each_row("setting", ["Fine 5, 5, 5, 5", "FineDist 0.001", "Fine 5,5,5,5; Pulse 0,0,0,0"])
 def test_a_servo_that_never_comes_within_fine_ends_in_its_error_after_two_seconds(setting):
     """P. 330, 332: 4024."""
     cell = Cell(servo_unrest_pulses=8)

@@ -15,6 +15,7 @@ from robolink.protocols.epson_text import (
     Request,
     parse_preferences,
 )
+from tests._rows import each_row
 
 # Requests of third-party clients, and the answers of real controllers.
 # The requests are those of public clients and transcripts (docs/reference/epson.md 1.10, 5).
@@ -286,7 +287,7 @@ def frame(letter, data=b""):
     return b"\x02" + body + bytes([checksum])
 
 
-@pytest.mark.parametrize("blanks", [b" ", b"\t", b"   "], ids=["a blank", "a tab", "three blanks"])
+@each_row("blanks", [b" ", b"\t", b"   "])
 def test_a_blank_before_the_dollar_sign_is_one_refusal_or_is_skipped(blanks):
     line = Line()
     assert line.say(b"$Login\r\n") == b"#Login,0\r\n"
@@ -306,7 +307,7 @@ def test_requests_without_line_ends_are_still_told_apart():
     assert events == [Request("GetStatus"), Request("Stop")]
 
 
-@pytest.mark.parametrize("letter", [b"D", b"z", b"?", b"\xe9"])
+@each_row("letter", [b"D", b"z", b"?", b"\xe9"])
 def test_a_letter_of_no_manual_is_refused_with_that_letter(letter):
     line = Line(serial=True)
     line.say(b"\x04")
@@ -319,7 +320,7 @@ def test_a_letter_of_no_manual_is_refused_with_that_letter(letter):
     assert not line.link.closed
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("options", "flags"),
     [({}, 11), ({"rc_plus": "5"}, 10), ({"rc_plus": "5", "status_flags": "11"}, 11)],
 )

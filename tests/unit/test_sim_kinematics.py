@@ -50,6 +50,7 @@ from robolink.model import (
     ToolOffset,
     combined_space,
 )
+from tests._rows import each_row
 from tests.unit._softmotion_rows import image_of
 
 T6 = find_robot("T6-602S")
@@ -129,13 +130,13 @@ def test_the_tip_turns_with_the_flange_and_adds_its_own_angle():
     assert tip.tool == 1
 
 
-@pytest.mark.parametrize("x_mm", [600.01, 1e200, float("nan"), 0.0])
+@each_row("x_mm", [600.01, 1e200, float("nan"), 0.0])
 def test_a_position_that_the_links_cannot_span_is_out_of_reach(x_mm):
     with pytest.raises(OutOfReach, match="reach"):
         solve(T6, Pose(x_mm, 0, 0, 0), Hand.RIGHT)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("joints", "joint"),
     [
         (Joints(-42.1, 0, 0, 0), 1),
@@ -153,7 +154,7 @@ def test_a_robot_is_found_in_any_case():
     assert find_robot("gx4-c251s").lengths_mm == (120, 130)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "says"),
     [
         ("C8-901S", "Did you mean C8-C901S,"),
@@ -202,7 +203,7 @@ def example(monkeypatch):
     sys.modules.pop("double_scara", None)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("space", "shift_mm", "impossible_mm"),
     [
         (OrientationSpace.known(NO_TURN), (1, 2, 3), (0, 0, 0)),
@@ -231,7 +232,7 @@ def test_an_orientation_is_projected_by_the_smallest_turn():
         OrientationSpace.directed(Z_AXIS, (0.0, 0.0, -1.0), NO_TURN)
 
 
-@pytest.mark.parametrize(
+@each_row(
     "broken",
     [
         {"dof": OrientationDof.ZERO, "m_ori_zero": ((1.0, 0.0, 0.0),) * 3},
@@ -255,7 +256,7 @@ ANY_TURN = OrientationImage(CsTool.FLANGE, FREE, b_active=True)
 SAID = OrientationImage(CsTool.MCS, OrientationSpace.known(TILTED), b_active=False)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("base", "image", "dof"),
     [
         (TILTED_BASE, C_AXIS, 0),
@@ -372,7 +373,7 @@ def test_a_class_without_an_orientation_image_moves_and_takes_no_tool():
     assert machine_named(f"{HERE}:Rail").kinematics.orientation_image(NO_TURN) is None
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "says"),
     [
         (f"{HERE}:BoastingRail", "does not hold the flange"),

@@ -30,6 +30,7 @@ from robolink.protocols.mailbox import (
     encode_command,
     encode_response,
 )
+from tests._rows import each_row
 from tests.unit._mailbox_client import FACTORS, LINE, MCS, another, linked, owning
 
 # The commands that the simulated mailbox program carries out, and those that it refuses.
@@ -330,7 +331,7 @@ def test_options_reach_the_part_that_they_are_about():
     assert len(set(option_names())) == len(option_names())
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("pairs", "words"),
     [
         ({"colour": "red"}, "no option 'colour'"),
@@ -375,7 +376,7 @@ def test_another_word_order_twice_is_none_and_the_checksum_stays_right(order, x,
     assert moved[:4] == block[:4]
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@each_row("order", ORDERS)
 def test_a_damaged_block_stays_damaged(order):
     words = list(encode_command(Command(1, Opcode.HALT)))
     words[9] ^= 1

@@ -19,6 +19,7 @@ from robolink_simulators.plc import PlcSimulator, device
 
 from robolink.errors import ConfigError
 from robolink.register_maps import load_map
+from tests._rows import each_row
 
 MAP = Path("examples/plc-maps/commit-bit.toml")
 
@@ -115,7 +116,7 @@ def test_a_request_is_refused_as_planned_and_not_carried_out(plc, code):
     assert plc.writes == ["fc16 100"]
 
 
-@pytest.mark.parametrize("code", [0, 9, 12])
+@each_row("code", [0, 9, 12])
 def test_an_exception_that_there_is_not_cannot_be_planned(code):
     with pytest.raises(ConfigError, match=f"no Modbus exception {code}"):
         Fault(FaultAction.MODBUS_EXCEPTION, code=code)

@@ -32,6 +32,7 @@ from robolink_simulators.epson.condition import OutOfReach
 from robolink.errors import ConfigError
 from robolink.model import Elbow, Hand, Posture, ToolOffset, Wrist
 from robolink.protocols.spel import parse_point
+from tests._rows import each_row
 
 # Six-axis and folding arms: EPSON's own descriptions, flags, and both directions of the kinematics.
 
@@ -80,7 +81,7 @@ def test_every_pose_of_the_vendors_own_geometry_is_reached():
             assert pose.coordinates()[3:] == pytest.approx(case["uvw_deg"], abs=1e-6), case
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("model", "joints", "pose"),
     [
         # docs/reference/epson-robots.md, "Six axes": zero, and the worked example of both mounts.
@@ -98,7 +99,7 @@ def test_printed_examples(model, joints, pose):
     assert there.coordinates() == pytest.approx(pose, abs=6e-4)
 
 
-@pytest.mark.parametrize("name", [*FAMILIES, *SIX_AXES])
+@each_row("name", [*FAMILIES, *SIX_AXES])
 def test_the_flags_of_a_pose_lead_back_to_its_joints(name):
     model, rng = find_robot(name), random.Random(name)
     for _ in range(60):
@@ -121,7 +122,7 @@ def test_the_flags_of_ten_thousand_poses_lead_back_to_their_joints(name):
         )
 
 
-@pytest.mark.parametrize("name", SIX_AXES)
+@each_row("name", SIX_AXES)
 def test_all_eight_ways_lead_to_one_pose(name):
     model, rng = find_robot(name), random.Random(name)
     ways = 0
@@ -143,7 +144,7 @@ def test_all_eight_ways_lead_to_one_pose(name):
     assert ways > 40
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("joints", "hand", "posture"),
     [
         ((0, 0, 0, 0, -90, 0), Hand.RIGHT, Posture()),

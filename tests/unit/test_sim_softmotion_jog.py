@@ -31,6 +31,7 @@ from robolink_simulators.softmotion.group.profile import Pace, SpeedProfile
 from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION
 
 from robolink.model import AxisKind, OrientationSpace
+from tests._rows import each_row
 from tests.unit._softmotion_machine import (
     CYCLE_NS,
     LINE,
@@ -83,7 +84,7 @@ def six_axes():
     return group
 
 
-@pytest.mark.parametrize(("bit", "axis"), [(3, X_AXIS), (4, Y_AXIS), (5, Z_AXIS)])
+@each_row(("bit", "axis"), [(3, X_AXIS), (4, Y_AXIS), (5, Z_AXIS)])
 def test_jogging_a_b_c_turns_about_the_axes_through_the_tip(bit, axis):
     """Behaviour 15."""
     group = six_axes()
@@ -217,7 +218,7 @@ def test_a_movement_ends_a_jog():
     assert move.outputs.done
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("command", "expected"),
     [
         (JogCommand(1, 0, CoordSystem.ACS, LINE), ErrorKind.DYNAMICS),
@@ -291,7 +292,7 @@ def test_a_disabled_group_lets_its_axes_move_alone():
     assert state_of(group) is SmcGroupState.DISABLED
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("prepare", "expected"),
     [
         (lambda group: group.power(on=False), ErrorKind.NO_POWER),

@@ -50,6 +50,7 @@ from robolink.model import (
     OrientationSpace,
     combined_space,
 )
+from tests._rows import each_row
 from tests.unit._softmotion_rows import AXES, DOF, drawn, image_of
 
 GANTRY = Gantry("Kin_Gantry3")
@@ -65,7 +66,7 @@ def test_the_worked_scara_of_the_reference_comes_out():
     assert yaw_deg(tcp.rotation) == pytest.approx(110)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("kinematics", "at_zero_mm"),
     [
         (Scara2Z(300, 200), (500, 0, 0)),
@@ -82,7 +83,7 @@ def test_with_all_axes_at_zero_the_flange_stands_where_documented(kinematics, at
     assert list(flange.rotation) == [pytest.approx(row) for row in NO_TURN]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_row("name", NAMES)
 def test_the_orientation_image_holds_every_flange_and_its_axes_are_found_again(name):
     """A sample of what tests/soak draws ten thousand times."""
     for pose in drawn(name, 4, seed=1):
@@ -97,7 +98,7 @@ def test_a_space_that_says_too_much_is_found_by_drawing():
     )
 
 
-@pytest.mark.parametrize(("name", "dof"), DOF.items())
+@each_row(("name", "dof"), DOF.items())
 def test_each_row_leaves_as_much_open_as_the_vendor_s_table_needs(name, dof):
     kinematics = machine_named(name).kinematics
     flange = kinematics.flange((0.0,) * AXES[name])
@@ -159,7 +160,7 @@ def test_a_wrist_of_three_axes_is_what_its_denavit_hartenberg_rows_say():
     require_same(Wrist3((0.0, 0.0, 70.0)).flange((10.0, 20.0, 30.0)), by_rows(*rows))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("kinematics", "axes", "flange_mm"),
     [
         # X+ on an H gantry: a0 forward, a1 as much back; Y+ both back.
@@ -191,9 +192,7 @@ def test_x_of_a_tripod_points_away_from_the_drive_of_a0():
     assert y_mm == pytest.approx(0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "name", ["Kin_Pos_RRR", "Kin_ArticulatedRobot_6DOF", "Kin_4AxisPalletizer"]
-)
+@each_row("name", ["Kin_Pos_RRR", "Kin_ArticulatedRobot_6DOF", "Kin_4AxisPalletizer"])
 def test_each_configuration_brings_the_flange_to_the_same_pose_by_other_axes(name):
     kinematics = machine_named(name).kinematics
     near = (20.0, 10.0, -20.0, 30.0, 40.0, 50.0)[: AXES[name]]
@@ -330,7 +329,7 @@ def test_parameters_go_by_the_names_of_the_blocks():
     assert short.flange((1.0, 2.0, 3.0, 40.0, 50.0)).shift_mm == pytest.approx((1.0, 2.0, 3.0))
 
 
-@pytest.mark.parametrize("name", [*DOF, "Kin_Gantry3+Kin_Wrist2", "Kin_Gantry3+Kin_Wrist3"])
+@each_row("name", [*DOF, "Kin_Gantry3+Kin_Wrist2", "Kin_Gantry3+Kin_Wrist3"])
 def test_every_kinematics_of_the_catalogue_takes_every_parameter_it_names(name):
     assumed = machine_named(name)
     limits = {"low": -1.0, "high": 1.0, "velocity_per_s": 2.0, "acceleration_per_s2": 3.0}
@@ -343,7 +342,7 @@ def test_every_kinematics_of_the_catalogue_takes_every_parameter_it_names(name):
     assert all(limit.velocity_per_s == 2.0 for limit in given_.limits)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "parameters"),
     [
         ("Kin_Delta", {}),
@@ -372,7 +371,7 @@ def test_what_makes_no_machine_is_refused_with_a_remedy(name, parameters):
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "says"),
     [
         ("kin_scara2_z", "Did you mean Kin_Scara2_Z"),
@@ -401,7 +400,7 @@ def test_the_flange_of_a_gantry_never_turns():
     assert GANTRY.axes_for(ORIGIN, ANY_CONFIGURATION, (9.0, 9.0, 9.0)) == (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize(("first_deg", "second_deg"), [(0, 0), (30, 0), (0, -70), (30, 100)])
+@each_row(("first_deg", "second_deg"), [(0, 0), (30, 0), (0, -70), (30, 100)])
 def test_two_free_turns_about_one_tilted_axis_are_one_that_holds_their_product(
     first_deg, second_deg
 ):

@@ -20,6 +20,7 @@ from robolink_simulators.softmotion import (
 )
 from robolink_simulators.softmotion.kinematics.kinematics import Configuration
 
+from tests._rows import each_row
 from tests.unit._softmotion_machine import (
     CYCLE_NS,
     FACTORS,
@@ -92,8 +93,8 @@ def test_near_the_middle_of_the_arm_a_line_slows_down_for_the_axes():
         assert all(speed <= limit * 1.02 for speed, limit in zip(speeds, top, strict=True))
 
 
-@pytest.mark.parametrize("system", [CoordSystem.MCS, CoordSystem.WCS, CoordSystem.PCS_2])
-@pytest.mark.parametrize("line", [True, False])
+@each_row("system", [CoordSystem.MCS, CoordSystem.WCS, CoordSystem.PCS_2])
+@each_row("line", [True, False])
 def test_a_target_counts_in_its_coordinate_system(system, line):
     group = standing()
     group.set_tool(NOZZLE)
@@ -144,7 +145,7 @@ def test_a_direct_movement_takes_the_turn_that_the_axis_can_reach():
     assert group.values[3] == pytest.approx(30)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("target", "expected"),
     [
         (Target((900, 0, 0, 0, 0, 0)), ErrorKind.UNREACHABLE),
@@ -156,7 +157,7 @@ def test_a_direct_movement_takes_the_turn_that_the_axis_can_reach():
         (in_axes(math.inf, 0, 0, 0), ErrorKind.PARAMETER),
     ],
 )
-@pytest.mark.parametrize("line", [True, False])
+@each_row("line", [True, False])
 def test_a_target_out_of_reach_is_refused_and_nothing_moves(target, expected, line):
     group = standing()
     command = group.move_linear_absolute if line else group.move_direct_absolute
@@ -182,8 +183,8 @@ def test_a_line_whose_way_leaves_the_workspace_is_refused():
     assert kind(refused) in (ErrorKind.UNREACHABLE, ErrorKind.AXIS_LIMIT)
 
 
-@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf, 1.6e-319, 1e-300, 9e-10])
-@pytest.mark.parametrize("place", range(4))
+@each_row("bad", [0.0, -1.0, math.nan, math.inf, 1.6e-319, 1e-300, 9e-10])
+@each_row("place", range(4))
 def test_dynamics_must_be_finite_and_large_enough_to_arrive(bad, place):
     group = standing()
     values = [1.0] * 4
@@ -193,7 +194,7 @@ def test_dynamics_must_be_finite_and_large_enough_to_arrive(bad, place):
     assert kind(group.move_direct_absolute(in_axes(0, 0, 0, 0), dynamics)) is ErrorKind.DYNAMICS
 
 
-@pytest.mark.parametrize("place", range(4))
+@each_row("place", range(4))
 def test_the_least_dynamics_make_a_movement_that_arrives(place):
     group = standing()
     values = [1.0] * 4
@@ -276,8 +277,8 @@ def test_buffered_movements_run_one_after_another():
     assert tcp_mm(group)[2] - start[2] == pytest.approx(10)
 
 
-@pytest.mark.parametrize("mode", BLENDING)
-@pytest.mark.parametrize("line", [True, False])
+@each_row("mode", BLENDING)
+@each_row("line", [True, False])
 def test_a_blended_corner_is_smooth_and_the_second_movement_counts_as_active(mode, line):
     """The second is active from the start of the blend (docs/reference/softmotion.md 2.1)."""
     group = standing()

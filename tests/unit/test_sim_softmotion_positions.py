@@ -38,6 +38,7 @@ from robolink_simulators.softmotion.kinematics.positions import about_z, yaw_deg
 
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset
+from tests._rows import each_row
 from tests.unit._softmotion_machine import (
     FACTORS,
     LINE,
@@ -72,8 +73,8 @@ def test_a_position_is_converted_by_the_tool_that_is_set_and_not_by_the_active_o
     assert group.read_tool().frame == CoordRef().frame()
 
 
-@pytest.mark.parametrize("tool", [None, NOZZLE, CoordRef(1, 2, 3, 4, 5, 6)])
-@pytest.mark.parametrize("system", [WCS, PCS_1, TCS])
+@each_row("tool", [None, NOZZLE, CoordRef(1, 2, 3, 4, 5, 6)])
+@each_row("system", [WCS, PCS_1, TCS])
 def test_there_and_back_is_where_it_was(system, tool):
     group = standing()
     group.set_coordinate_transform(MCS, CoordRef(10, 20, 30, 40, 0, 0))
@@ -92,7 +93,7 @@ def test_other_axes_as_reference_take_the_other_elbow():
     assert mirrored[1] == pytest.approx(-45.0)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("kinematics", "position", "tool", "because"),
     [
         ("Kin_Scara3_Z", (9e3, 0, 0, 0, 0, 0), None, ErrorKind.UNREACHABLE),
@@ -111,7 +112,7 @@ def in_pcs(group):
     return Target((here[0] - 30, *here[1:]), PCS_1)
 
 
-@pytest.mark.parametrize("how", ["line", "direct", "interrupted", "jog"])
+@each_row("how", ["line", "direct", "interrupted", "jog"])
 def test_a_coordinate_system_in_use_is_not_moved(how):
     group = standing()
     if how == "jog":
@@ -231,7 +232,7 @@ def test_axis_and_angle_of_a_rotation_give_it_back(a_deg, b_deg, c_deg):
     assert list(about(axis, angle_deg)) == [pytest.approx(row, abs=1e-7) for row in rotation]
 
 
-@pytest.mark.parametrize("half_turn", [about(X_AXIS, 180), zyz(30, 180, 0), about_z(180)])
+@each_row("half_turn", [about(X_AXIS, 180), zyz(30, 180, 0), about_z(180)])
 def test_half_a_turn_has_an_axis_too(half_turn):
     axis, angle_deg = axis_and_angle(half_turn)
     assert list(about(axis, angle_deg)) == near(half_turn)
@@ -272,7 +273,7 @@ def test_tcs_stands_at_the_tcp():
     assert CoordinateTransforms().in_mcs(CoordSystem.TCS, tcp) == tcp
 
 
-@pytest.mark.parametrize("system", [CoordSystem.ACS, CoordSystem.WCS, CoordSystem.TCS])
+@each_row("system", [CoordSystem.ACS, CoordSystem.WCS, CoordSystem.TCS])
 def test_a_system_without_a_place_of_its_own_cannot_be_put_anywhere(system):
     with pytest.raises(BlockRefused) as caught:
         CoordinateTransforms().place(system, ORIGIN)
@@ -295,15 +296,15 @@ def gap_mm(world):
     return [p - t for p, t in zip(world.pin_mm, world.tip_mm(), strict=True)]
 
 
-@pytest.mark.parametrize("name", MACHINES)
-@pytest.mark.parametrize("seed", [1, 2, 99])
+@each_row("name", MACHINES)
+@each_row("seed", [1, 2, 99])
 def test_every_machine_starts_beside_its_pin_and_above_it(name, seed):
     x_mm, y_mm, z_mm = gap_mm(world_of(name, seed))
     assert 5 <= math.hypot(x_mm, y_mm) <= 13
     assert -6.01 <= z_mm <= -2.99
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@each_row("name", MACHINES)
 def test_jogging_ends_where_the_eye_sees_no_gap(name):
     world = world_of(name)
     if name != "Kin_Pos_RRR":
@@ -357,7 +358,7 @@ def test_a_seed_gives_the_same_world_again_and_another_seed_another():
     assert world_of(seed=5).truth() != world_of(seed=6).truth()
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@each_row("name", MACHINES)
 def test_the_nozzle_was_changed_by_what_the_kinematics_can_be_told(name):
     world = world_of(name)
     tip, stored = world.tips[1], world.stored

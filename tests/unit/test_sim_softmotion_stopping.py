@@ -16,6 +16,7 @@ from robolink_simulators.softmotion import (
     Target,
 )
 
+from tests._rows import each_row
 from tests.unit._softmotion_machine import (
     FACTORS,
     LINE,
@@ -44,7 +45,7 @@ def stopped(**options):
     return group
 
 
-@pytest.mark.parametrize("during", ["movement", "standby", "jog"])
+@each_row("during", ["movement", "standby", "jog"])
 def test_a_stop_holds_the_group_until_execute_falls(during):
     """Behaviour 13."""
     group = standing()
@@ -106,7 +107,7 @@ def test_a_second_stop_joins_the_first():
     assert state_of(group) is SmcGroupState.STANDBY
 
 
-@pytest.mark.parametrize("block", ["halt", "interrupt", "resume"])
+@each_row("block", ["halt", "interrupt", "resume"])
 def test_a_stop_overrules_every_other_way_of_coming_to_rest(block):
     assert getattr(stopped(), block)().outputs.aborted
 
@@ -148,8 +149,8 @@ def test_a_new_movement_ends_a_halt():
     assert move.outputs.done
 
 
-@pytest.mark.parametrize("block", ["stop", "halt", "interrupt", "resume"])
-@pytest.mark.parametrize("state", [SmcGroupState.DISABLED, SmcGroupState.ERROR_STOP])
+@each_row("block", ["stop", "halt", "interrupt", "resume"])
+@each_row("state", [SmcGroupState.DISABLED, SmcGroupState.ERROR_STOP])
 def test_nothing_can_come_to_rest_in_disabled_or_error(block, state):
     group = in_error() if state is SmcGroupState.ERROR_STOP else standing()
     if state is SmcGroupState.DISABLED:
@@ -230,7 +231,7 @@ def test_continuing_needs_the_place_of_the_interruption():
     assert move.outputs.done
 
 
-@pytest.mark.parametrize("end", ["stop", "halt", "disable", "fail_axis"])
+@each_row("end", ["stop", "halt", "disable", "fail_axis"])
 def test_an_interrupted_movement_ends_with_the_group(end):
     group = standing()
     move = moved(group, x_mm=-60)

@@ -19,6 +19,7 @@ from robolink_simulators.softmotion import (
 )
 from robolink_simulators.softmotion.kinematics.positions import Gantry
 
+from tests._rows import each_row
 from tests.unit._softmotion_machine import (
     FACTORS,
     MACHINES,
@@ -101,7 +102,7 @@ def test_a_polar_kinematics_takes_shifts_along_z_only():
     assert set_to(group, z=1).outputs.done
 
 
-@pytest.mark.parametrize("name", [n for n in MACHINES if n not in LIMITED])
+@each_row("name", [n for n in MACHINES if n not in LIMITED])
 def test_a_kinematics_whose_orientation_is_known_takes_any_tool(name):
     """Behaviour 7, and a C axis behind an arm lifts its restriction.
 
@@ -226,8 +227,8 @@ def test_whether_the_last_commanded_tool_outlives_its_movement_is_an_option(kept
             group.read_tool(ReadToolMode.LAST_COMMANDED)
 
 
-@pytest.mark.parametrize("mode", [SmcBufferMode.ABORTING, SmcBufferMode.BLENDING_HIGH])
-@pytest.mark.parametrize("changed", [True, False])
+@each_row("mode", [SmcBufferMode.ABORTING, SmcBufferMode.BLENDING_HIGH])
+@each_row("changed", [True, False])
 def test_a_tool_change_between_two_lines_makes_the_second_wait(mode, changed):
     group = standing()
     set_to(group, z=-10)
@@ -242,7 +243,7 @@ def test_a_tool_change_between_two_lines_makes_the_second_wait(mode, changed):
     assert second.outputs.done
 
 
-@pytest.mark.parametrize(("before", "after"), [(CP, DIRECT), (DIRECT, CP), (DIRECT, DIRECT)])
+@each_row(("before", "after"), [(CP, DIRECT), (DIRECT, CP), (DIRECT, DIRECT)])
 def test_a_tool_change_beside_a_direct_movement_leaves_aborting_alone(before, after):
     group = standing()
     first = commanded(group, before)
@@ -357,16 +358,21 @@ def require_as_by_hand(kinds, modes, changes):
     assert blocks[-1].outputs.done
 
 
-@pytest.mark.parametrize("changes", [*product([True, False], repeat=2)])
-@pytest.mark.parametrize("first", SmcBufferMode)
-def test_every_order_of_buffer_modes_among_lines(first, changes):
-    for second in SmcBufferMode:
-        require_as_by_hand((LINE, LINE, LINE), (first, second), changes)
+def test_every_order_of_buffer_modes_among_lines():
+    """Each pair of modes once; each mode at each place with each way to change tools."""
+    ways = [*product([True, False], repeat=2)]
+    for (at, first), (then, second) in product(enumerate(SmcBufferMode), repeat=2):
+        require_as_by_hand((LINE, LINE, LINE), (first, second), ways[(at + then) % len(ways)])
 
 
-@pytest.mark.parametrize(
-    "kinds", [k for k in product([LINE, DIRECT_CHANGES], repeat=3) if DIRECT_CHANGES in k]
-)
+@pytest.mark.soak
+def test_every_order_of_buffer_modes_among_lines_with_each_way_to_change_tools():
+    for changes in product([True, False], repeat=2):
+        for modes in product(SmcBufferMode, repeat=2):
+            require_as_by_hand((LINE, LINE, LINE), modes, changes)
+
+
+@each_row("kinds", [k for k in product([LINE, DIRECT_CHANGES], repeat=3) if DIRECT_CHANGES in k])
 def test_every_order_of_kinds_of_movements(kinds):
     for changes in product([True, False], repeat=2):
         for modes in ((A, BLENDING[0]), (BLENDING[-1], A)):

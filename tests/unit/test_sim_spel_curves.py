@@ -23,6 +23,7 @@ from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.spel.interpreter import Interpreter
 
 from robolink.model import Pose
+from tests._rows import each_row
 from tests.unit.test_sim_spel_motion import Cell
 
 # Curve stores a free curve, CVMove travels it (docs/reference/spel.md 7.1).
@@ -306,7 +307,7 @@ def test_a_turn_about_the_control_point_alone_is_no_way_past_it():
     assert cell.start('Curve "c", O, 16, 4, P1, P1 +U(9), P2').error.number == 4002
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("statement", "number"),
     [
         ('Curve "c", O, 0, 4, P1, P2, P3', 4002),

@@ -19,6 +19,8 @@ from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.parser import parse
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
+from tests._rows import each_row
+
 # Expressions and Print.
 
 NUMBERS = SpelNumbers()
@@ -43,7 +45,7 @@ def refused(statement, **habits):
     return execution.error.number
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("expression", "expected"),
     [
         ("-2**2", "-4"),
@@ -72,7 +74,7 @@ def test_operators_follow_the_precedence_of_the_reference(expression, expected):
     assert printed(expression) == expected
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("expression", "expected"),
     [
         ("Abs(-3.54), Sgn(-2), Sqr(2)", "3.54 -1 1.4142135623731"),
@@ -99,7 +101,7 @@ def test_functions_give_what_the_reference_says(expression, expected):
     assert printed(expression) == expected
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("expression", "expected"),
     [
         ("0.1 + 0.2", "0.3"),
@@ -138,7 +140,7 @@ def test_keywords_are_read_in_any_case_and_comments_are_skipped():
     assert interpreter().start("pRINT hEX$(&hff) ' Print 2", 0).output == "FF\r\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("expression", "number"),
     [
         ("1 / 0", NUMBERS.division),
@@ -172,9 +174,7 @@ def test_a_value_that_cannot_be_had_is_an_error(expression, number):
     assert refused(f"Print {expression}") == number
 
 
-@pytest.mark.parametrize(
-    "statement", ["If 1 = 1 Then On 1", "VRun seq", "Pause", "On 1; For i = 1 To 2"]
-)
+@each_row("statement", ["If 1 = 1 Then On 1", "VRun seq", "Pause", "On 1; For i = 1 To 2"])
 def test_statements_for_programs_only_are_refused_before_anything_runs(statement):  # 40
     runner = interpreter()
     execution = runner.start(statement, 0)
@@ -198,7 +198,7 @@ def test_error_numbers_come_from_the_options():
     assert refused("Print 1 +", numbers=SpelNumbers(syntax=1234)) == 1234
 
 
-@pytest.mark.parametrize("text", ["Print " + "(" * 2000 + "1" + ")" * 2000, "", " ", ";;", "'"])
+@each_row("text", ["Print " + "(" * 2000 + "1" + ")" * 2000, "", " ", ";;", "'"])
 def test_odd_but_legal_lines_are_carried_out(text):
     execution = interpreter().start(text, 0)
     assert execution.done

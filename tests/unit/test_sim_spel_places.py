@@ -13,6 +13,7 @@ from robolink_simulators.epson.memory.points import HIGHEST_LOCAL
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.legs import go_leg
 
+from tests._rows import each_row
 from tests.unit.test_sim_spel_motion import Cell as CellWithArms
 from tests.unit.test_sim_spel_points import NUMBERS, Window
 
@@ -336,8 +337,8 @@ def test_an_added_arm_counts_from_the_joints_that_carry_it(cell):
     assert cell.run("Arm; Print Arm") == "1\r\n1\r\n"
 
 
-@pytest.mark.parametrize("robot", ["T6-602S", "RS4-C351S"])
-@pytest.mark.parametrize("verb", ["Go", "Move", "Jump"])
+@each_row("robot", ["T6-602S", "RS4-C351S"])
+@each_row("verb", ["Go", "Move", "Jump"])
 def test_motions_bring_the_added_axis_to_the_same_point(robot, verb):
     cell = CellWithArms()
     if robot != "T6-602S":

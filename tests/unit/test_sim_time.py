@@ -21,6 +21,7 @@ from robolink.protocols.mailbox import (
     encode_command,
     heartbeat_word,
 )
+from tests._rows import each_row
 
 # Simulated time.
 
@@ -80,7 +81,7 @@ def test_real_seconds_until_a_simulated_instant():
     assert clock.real_seconds(5_000_000_000, 3_000_000_000) == 0.2
 
 
-@pytest.mark.parametrize("factor", [0, -1, float("inf"), float("nan")])
+@each_row("factor", [0, -1, float("inf"), float("nan")])
 def test_a_factor_must_be_above_zero(factor):
     with pytest.raises(ConfigError, match="factor"):
         ScaledClock(factor)
@@ -179,8 +180,14 @@ class Side:
         return self.link.outgoing(), simulator.next_change(), flags, bits, simulator.now_ns
 
 
-@pytest.mark.parametrize("seed", [0, 3, 8, 10, 15])
-@pytest.mark.parametrize("loaded", [False, True], ids=["no program", "a program"])
+LIVES = [
+    pytest.param(seed, loaded, marks=() if loaded is (at % 2 == 0) else pytest.mark.soak)
+    for at, seed in enumerate((0, 3, 8, 10, 15))
+    for loaded in (False, True)
+]
+
+
+@pytest.mark.parametrize(("seed", "loaded"), LIVES)
 def test_what_shows_is_the_same_as_without_any_shortcut(seed, loaded, tmp_path):
     rng, now_ns = random.Random(seed), 0
     options = EpsonOptions(remote_timeout_s=5.0)

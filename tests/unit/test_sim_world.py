@@ -29,6 +29,7 @@ import robolink
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset, WorkBox
 from robolink.runner import Question, Runner, RunSettings, ask_for_pose
+from tests._rows import each_row
 
 # The true world, and the person who looks at it.
 
@@ -38,7 +39,7 @@ CHOSEN = (  # one of each family and mount
 )
 
 
-@pytest.mark.parametrize("model", [model.name for model in robots()])
+@each_row("model", [model.name for model in robots()])
 def test_every_robot_starts_beside_its_pin_and_above_it(model):
     world = EpsonSimulator(model, seed=len(model)).world
     x_mm, y_mm, z_mm = (p - t for p, t in zip(world.pin_mm, world.tip_mm(), strict=True))
@@ -46,8 +47,8 @@ def test_every_robot_starts_beside_its_pin_and_above_it(model):
     assert -6.01 <= z_mm <= -2.99
 
 
-@pytest.mark.parametrize("model", CHOSEN)
-@pytest.mark.parametrize("u_deg", [0, 180])
+@each_row("model", CHOSEN)
+@each_row("u_deg", [0, 180])
 def test_the_tip_reaches_the_pin_with_both_angles(model, u_deg):
     simulator = EpsonSimulator(model)
     simulator.panel.teach()

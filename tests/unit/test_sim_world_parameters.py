@@ -26,6 +26,7 @@ from robolink.errors import ConfigError
 from robolink.messages import known_names
 from robolink.model import ToolOffset
 from robolink.transport import parse_url
+from tests._rows import each_row
 
 KINDS = {"epson": EpsonSimulator, "softmotion": SoftMotionSimulator}
 
@@ -246,7 +247,7 @@ def test_the_assist_port_furnishes_and_spoils_a_cell(make):
     assert not read_input(simulator, 7)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("request_", "said"),
     [
         ({"do": "set_world", "wind": 1}, "no parameter 'wind'"),

@@ -25,6 +25,7 @@ from robolink.report import render, render_drift, reports_of
 from robolink.testing import confirm_whole_map
 from robolink.transaction import Wanted, change_tools
 from robolink.transport import parse_url
+from tests._rows import each_row
 
 MAP = Path("examples/plc-maps/no-handshake.toml")
 BAND, VERDICT = "SIMULATED: these results come from a simulator", "Simulated: "
@@ -64,7 +65,7 @@ CASES: dict[str, tuple[str, dict[str, object], bool]] = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@each_row("name", CASES)
 def test_the_page_of_a_recorded_change_carries_a_band_and_the_verdict_says_it(name):
     controller, said, simulated = CASES[name]
     (report,) = reports_of(changed(controller, **said), check="", **MADE)
@@ -127,7 +128,7 @@ def test_a_typed_value_on_a_simulated_controller_has_a_band_too(changed_by_hand)
     assert (BAND in page, VERDICT in page) == (simulated, simulated)
 
 
-@pytest.mark.parametrize(
+@each_row(
     "address",
     [
         "plc+modbus-tcp://192.168.0.2?map={map}&simulated=yes",
@@ -144,7 +145,7 @@ def test_the_sign_of_a_simulator_is_refused_where_a_machine_could_be(address):
         open_plc_map(parse_url(address.format(map=MAP)), outcomes=lambda name: pytest.fail(name))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("address", "here"),
     [
         ("127.0.0.1:502", True),

@@ -19,6 +19,7 @@ from robolink.protocols.spel_callback import (
     same_thousandths,
     tool_fields,
 )
+from tests._rows import each_row
 
 FIELDS = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=12).map(
     lambda text: text.replace("*", "x").replace(",", "y")
@@ -83,7 +84,7 @@ def test_whatever_comes_is_refused_for_good_and_little_of_it_is_kept(chunks):
             codec.next_event()
 
 
-@pytest.mark.parametrize("field", ["", "a,b", "a*b", "a b", "\u00e4", "a\n"])
+@each_row("field", ["", "a,b", "a*b", "a b", "\u00e4", "a\n"])
 def test_a_field_that_would_be_read_otherwise_is_not_sent(field):
     with pytest.raises(LocalProtocolError):
         encode_line(CallbackLine(1, CallbackWord.OK, (field,)))
@@ -102,7 +103,7 @@ def test_a_tool_comes_back_to_the_last_thousandth(thousandths):
     assert read_tool(tool_fields(None)) is None
 
 
-@pytest.mark.parametrize("field", ["1.5", "nan", "", "+1", "12345678", "1e3", " 1"])
+@each_row("field", ["1.5", "nan", "", "+1", "12345678", "1e3", " 1"])
 def test_what_is_no_whole_number_is_no_pose(field):
     with pytest.raises(RemoteProtocolError):
         read_components(["0"] * 5 + [field])

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.protocols.spel import decimal, parse_boolean, parse_integer, parse_number
+from tests._rows import each_row
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("value", "places", "text"),
     [
         (12, 3, "12.000"),
@@ -28,7 +29,7 @@ def test_a_decimal_has_fixed_places_and_zero_has_no_sign(value, places, text):
 
 
 @pytest.mark.fault("F37")
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@each_row("value", [math.nan, math.inf, -math.inf])
 def test_what_is_not_finite_is_never_written(value):
     with pytest.raises(ConfigError):
         decimal(value)
@@ -43,7 +44,7 @@ def test_a_written_decimal_reads_back_within_half_of_its_last_digit(value):
     assert abs(parse_number(text) - value) <= 0.0005 + 1e-6
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "value"),
     [
         ("17.234", 17.234),
@@ -77,7 +78,7 @@ WRONG = [
 
 
 @pytest.mark.fault("F38")
-@pytest.mark.parametrize("text", [*WRONG, "1.0E+999", "1.0E5", "\u00a01", "Tool 1"])
+@each_row("text", [*WRONG, "1.0E+999", "1.0E5", "\u00a01", "Tool 1"])
 def test_f38_anything_else_is_no_number(text):
     with pytest.raises(RemoteProtocolError) as caught:
         parse_number(text)
@@ -85,19 +86,19 @@ def test_f38_anything_else_is_no_number(text):
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize(("text", "value"), [("3", 3), (" 15\r\n", 15), ("-1", -1), ("007", 7)])
+@each_row(("text", "value"), [("3", 3), (" 15\r\n", 15), ("-1", -1), ("007", 7)])
 def test_a_printed_whole_number_is_read(text, value):
     assert parse_integer(text) == value
 
 
 @pytest.mark.fault("F38")
-@pytest.mark.parametrize("text", [*WRONG, "1.0", "9" * 5000, "True"])
+@each_row("text", [*WRONG, "1.0", "9" * 5000, "True"])
 def test_anything_else_is_no_whole_number(text):
     with pytest.raises(RemoteProtocolError):
         parse_integer(text)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "value"),
     [("-1", True), ("1", True), ("0", False), ("True", True), (" FALSE\r\n", False)],
 )
@@ -105,7 +106,7 @@ def test_a_boolean_is_read_in_every_spelling(text, value):
     assert parse_boolean(text) is value
 
 
-@pytest.mark.parametrize("text", ["", "2", "yes", "-0", "1.0", "\uff11", "True False"])
+@each_row("text", ["", "2", "yes", "-0", "1.0", "\uff11", "True False"])
 def test_anything_else_is_no_boolean(text):
     with pytest.raises(RemoteProtocolError):
         parse_boolean(text)

@@ -8,6 +8,7 @@ from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.model import Elbow, Hand, Pose, Posture, Wrist
 from robolink.pose_tables import parse_pts, read_poses, read_pts
 from robolink.protocols.spel import PrintedPoint, format_point, parse_point
+from tests._rows import each_row
 
 # Points as Print shows them.
 
@@ -31,7 +32,7 @@ def test_the_real_capture_is_read_and_written_again():
     assert format_point(point) == CAPTURE
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "point"),
     [
         (
@@ -61,7 +62,7 @@ def test_other_widths_and_flags_are_read(text, point):
     assert parse_point(text) == point
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         "",

@@ -36,6 +36,7 @@ from robolink.errors import ConfigError, LocalProtocolError
 from robolink.model import Hand, Pose, ToolOffset
 from robolink.protocols import Role, spel
 from robolink.protocols.epson_text import EpsonTextCodec, Request
+from tests._rows import each_row
 
 # Typed statements: the text sent, and refusals before it is sent.
 
@@ -43,7 +44,7 @@ TOOL = ToolOffset(12.0, -3.25, -0.0001, 45.0)
 POSE = Pose(350.0, -100.0, -20.0004, 90.0)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("statement", "text"),
     [
         (spel.set_tool(1, TOOL, six_axes=False), "TLSet 1, XY(12.000, -3.250, 0.000, 45.000)"),
@@ -90,7 +91,7 @@ def test_a_statement_is_written_as_documented_and_fits_execute(statement, text):
     assert sent == f'$Execute,"{text}"\r\n'.encode()
 
 
-@pytest.mark.parametrize(
+@each_row(
     "build",
     [
         lambda: spel.set_tool(0, TOOL, six_axes=False),
@@ -196,16 +197,14 @@ def answer(client, statement):
     return "`" + said.removeprefix('#Execute,"').removesuffix('"').removesuffix("\r\n") + "`"
 
 
-@pytest.fixture
-def client(login):
+BEFORE = before()
+
+
+@each_row(("statement", "expected"), rows())
+def test_a_statement_is_answered_as_the_page_says(login, statement, expected):
     client = login(EpsonSimulator(serial="SIM00001", options=EpsonOptions(remote_timeout_s=0)))
-    for line in before():
+    for line in BEFORE:
         assert answer(client, line) == "0"
-    return client
-
-
-@pytest.mark.parametrize(("statement", "expected"), rows(), ids=lambda value: value[:40])
-def test_a_statement_is_answered_as_the_page_says(client, statement, expected):
     said = answer(client, statement)
     pattern = re.escape(expected).replace(re.escape("..."), ".*")
     assert re.fullmatch(pattern, said, re.DOTALL), said
@@ -281,7 +280,7 @@ def ended(read, line):
         return str(refusal)
 
 
-@pytest.mark.parametrize("line", LINES)
+@each_row("line", LINES)
 def test_a_filled_line_is_the_line_that_was_read(line):
     assert ended(parse, line) == ended(_read, line)
     # And with other numbers, when its shape is known.

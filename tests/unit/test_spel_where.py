@@ -14,6 +14,7 @@ from robolink.protocols.spel import (
     parse_tool_listing,
     parse_where,
 )
+from tests._rows import each_row
 
 # The three lines of Where.
 
@@ -68,7 +69,7 @@ def test_other_widths_are_read(text):
 GOOD = format_where(SCARA)
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         "",
@@ -97,7 +98,7 @@ def test_anything_else_is_no_position(text):
 
 
 @pytest.mark.timeout(5)
-@pytest.mark.parametrize("line", [0, 1, 2])
+@each_row("line", [0, 1, 2])
 def test_a_hostile_run_of_blanks_is_refused_at_once(line):
     lines = GOOD.split("\r\n")
     lines[line] += " " * 60_000 + "x"
@@ -112,7 +113,7 @@ TILTED = st.builds(ToolOffset, *[VALUES] * 6)
 NUMBERS = st.integers(1, 15)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "tools"),
     [
         ("", {}),
@@ -136,7 +137,7 @@ def test_a_listing_is_read(text, tools):
     assert parse_tool_listing(text) == tools
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         "Tool",
@@ -191,14 +192,14 @@ def test_the_layouts_are_the_documented_ones():
 # The statements that ask for a taught point.
 
 
-@pytest.mark.parametrize("number", [0, 1, 901, 999])
+@each_row("number", [0, 1, 901, 999])
 def test_a_point_is_named_by_its_number(number):
     assert spel.print_point(number) == f"Print P{number}"
     assert spel.print_point_defined(number) == f"Print PDef(P{number})"
 
 
-@pytest.mark.parametrize("number", [-1, 1000, True, 1.0, "1"])
-@pytest.mark.parametrize("build", [spel.print_point, spel.print_point_defined])
+@each_row("number", [-1, 1000, True, 1.0, "1"])
+@each_row("build", [spel.print_point, spel.print_point_defined])
 def test_another_point_is_never_asked_for(build, number):
     with pytest.raises(LocalProtocolError):
         build(number)

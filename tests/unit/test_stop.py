@@ -32,6 +32,7 @@ from robolink.stop_latch import CommandClass, StopLatch
 from robolink.stopping import clear_note, find_note, leave_note
 from robolink.timing import NS_PER_S
 from tests._patience import PATIENCE_S
+from tests._rows import each_row
 
 # The requests that a stop lets through, and from whom.
 
@@ -170,7 +171,7 @@ def test_closing_a_link_waits_for_the_stop_that_uses_it(latch):
         thread.join()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("statement", "expected"),
     [
         ("Print RealPos", LOOK),
@@ -333,8 +334,8 @@ def test_the_first_frame_is_the_abort_and_one_of_each_is_enough():
     assert (flags.running, code) == (False, 0)
 
 
-@pytest.mark.parametrize("stop_refusal", [21, -1], ids=["refused", "held back here"])
-@pytest.mark.parametrize("shown", [RUNNING, READY])
+@each_row("stop_refusal", [21, -1])
+@each_row("shown", [RUNNING, READY])
 def test_ready_flags_are_no_rest_while_an_execute_keeps_the_stop_out(shown, stop_refusal):
     robot = Robot(aborts=3, shown=shown, stop_refusal=stop_refusal)
     robot.stop()
@@ -423,10 +424,9 @@ def test_who_only_ever_answers_something_else_is_no_controller():
         conversation.exchange("GetStatus")
 
 
-@pytest.mark.parametrize(
+@each_row(
     "pieces",
     [(), (b"#GetCon",), (LATE * 16,), (b"",)],
-    ids=["nothing", "half of it", "others only", "the end"],
 )
 def test_after_an_answer_that_was_given_up_nothing_more_is_sent(pieces):
     wire = Wire(*pieces)

@@ -14,6 +14,7 @@ from robolink.register_maps import (
     load_symbol_map,
     to_compare,
 )
+from tests._rows import each_row
 
 GOOD = """
 schema = "robolink/plc-map/1"
@@ -89,7 +90,7 @@ def test_fields_of_structures_and_of_their_arrays_are_places(write):
     assert found.slots[1].components["y"].place == f"{ROOT}aTools, field [3].rY"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("old", "new", "where", "what"),
     [
         ("element = 0", "element = 6", "tools#1.x.element", "less than 6"),

@@ -15,9 +15,40 @@ from hypothesis.internal.conjecture import providers
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.model import Secret
 from tests import _warm_process
+from tests._rows import each_row
 from tests.conftest import CANARIES, PATH, hear_signals, pytest_runtest_teardown
 from tests.mutants.changes import Kind, mutants_of
 from tests.mutants.places import drawn
+
+# A table of rows in one test.
+
+
+def test_every_row_that_fails_is_told_and_fails_the_test():
+    seen = []
+
+    @each_row(("number", "wanted"), [(1, 1), (2, 3), (4, 4), (0, 5)])
+    def check(number, wanted, limit):
+        seen.append(number)
+        assert limit / number > 0
+        assert number == wanted
+
+    with pytest.raises(pytest.fail.Exception) as caught:
+        check(limit=9)
+    assert seen == [1, 2, 4, 0]
+    told = str(caught.value)
+    assert told.startswith("2 of 4 rows:")
+    assert "number=2, wanted=3" in told
+    assert "AssertionError: assert 2 == 3" in told
+    assert "number=0, wanted=5" in told
+    assert "ZeroDivisionError" in told
+
+
+def test_a_row_with_marks_or_a_table_without_rows_checks_nothing_in_silence():
+    with pytest.raises(AssertionError, match="a test of its own"):
+        each_row("number", [pytest.param(1, marks=pytest.mark.soak)])
+    with pytest.raises(AssertionError, match="without rows"):
+        each_row("number", [])(lambda number: None)()
+
 
 # A run of the tests: started programs get signals, and processes share the run.
 
@@ -202,7 +233,7 @@ def changes(text, kind):
     return [one.change for one in found if one.kind is kind]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("kind", "body", "expected"),
     [
         (Kind.COMPARISON, "return a < b <= c", ["a < b => a <= b", "b <= c => b < c"]),
@@ -228,7 +259,7 @@ def test_a_line_is_changed_as_a_tired_person_would(kind, body, expected):
     assert changes(f"def f(a, b, c): {body}", kind) == expected
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         '"""What it is."""',

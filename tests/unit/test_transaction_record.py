@@ -55,6 +55,7 @@ from robolink.transaction import (
     recover,
 )
 from robolink.transaction._put_back import Step, put_back
+from tests._rows import each_row
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
 
 # An open job is judged by reading the controller, and finished or undone accordingly.
@@ -421,10 +422,9 @@ def test_what_is_read_back_is_the_test_with_its_limits():
     assert one.settings.speed_mm_s == 15.0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("tools", "kind"),
     [((1, 2), MarkerKind.CHANGE), ((2,), MarkerKind.CHANGE), ((1,), MarkerKind.SET)],
-    ids=["a tool without a test", "a test of another tool", "another kind of marker"],
 )
 def test_a_change_whose_tools_are_not_all_tested_by_it_has_no_test(tools, kind):
     kept = marked(1)

@@ -11,6 +11,7 @@ from robolink.controllers.registry import find_opener
 from robolink.errors import ConfigError
 from robolink.methods import find_method
 from robolink.transport import TRANSPORTS_GROUP, open_transport, parse_url
+from tests._rows import each_row
 from tests.unit.test_transport_trace import ScriptedTransport
 
 # URLs that name a controller.
@@ -43,7 +44,7 @@ def test_an_ipv6_address_keeps_its_brackets_in_the_identity():
     assert (url.host, url.identity) == ("fe80::1", "epson+tcp://[fe80::1]:5000")
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         "",
@@ -65,7 +66,7 @@ def test_what_is_no_controller_url_is_refused_with_a_remedy(text):
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize(
+@each_row(
     "text",
     [
         "epson+tcp://:hunter2@host:5000",
@@ -168,7 +169,7 @@ def test_an_entry_point_that_cannot_be_loaded_is_an_error_of_ours(entry_points, 
     assert isinstance(caught.value.__cause__, (ImportError, AttributeError))
 
 
-@pytest.mark.parametrize(
+@each_row(
     "url",
     [
         "epson+tcp://192.168.0.1",

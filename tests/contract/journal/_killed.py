@@ -1,10 +1,10 @@
-"""Runs work on a journal repeatedly; each run is killed one statement later than the last.
+"""Runs work on a journal repeatedly; each run is killed some statements later than the last.
 
-Arguments: the path of the journal, and ``again`` to do the steps of a tool write in it or ``anew``
-to make a journal for each run. For each run one line on stdout says how many steps were
-acknowledged before the process was killed; the last run completes. Each run is a forked process;
-where there is no fork, as on Windows, it is a started one, with the run's number as its third
-argument.
+Arguments: the path of the journal; ``again`` to do the steps of a tool write in it or ``anew`` to
+make a journal for each run; and how many statements later. For each run one line on stdout says how
+many steps were acknowledged before the process was killed; the last run completes. Each run is a
+forked process; where there is no fork, as on Windows, it is a started one, with the run's number as
+its fourth argument.
 """
 
 import os
@@ -99,7 +99,8 @@ def killed_in_a_fork(number: int, location: str, anew: bool) -> tuple[int, bool]
 def killed_in_a_process(number: int, location: str, anew: bool) -> tuple[int, bool]:
     """Run once in a started process; return the same as :func:`killed_in_a_fork`."""
     how = "anew" if anew else "again"
-    command = (sys.executable, "-m", "tests.contract.journal._killed", location, how, str(number))
+    program = "tests.contract.journal._killed"
+    command = (sys.executable, "-m", program, location, how, "1", str(number))
     done = subprocess.run(command, stdout=subprocess.PIPE, check=False)
     if done.returncode not in {0, KILL}:
         sys.exit(done.returncode)
@@ -108,14 +109,14 @@ def killed_in_a_process(number: int, location: str, anew: bool) -> tuple[int, bo
 
 def main() -> None:
     """Run until one run completes, or only the run whose number is given."""
-    location, anew = sys.argv[1], sys.argv[2] == "anew"
-    if len(sys.argv) > 3:
+    location, anew, later = sys.argv[1], sys.argv[2] == "anew", int(sys.argv[3])
+    if len(sys.argv) > 4:
         once = make_once if anew else partial(run_once, acknowledge=sys.stdout.fileno())
-        once(int(sys.argv[3]), location=location)
+        once(int(sys.argv[4]), location=location)
         return
     load_all(f"{location}-0" if anew else location)
     run = killed_in_a_fork if hasattr(os, "fork") else killed_in_a_process
-    for number in count(1):
+    for number in count(1, later):
         acknowledged, ended = run(number, location, anew)
         print(acknowledged, flush=True)  # noqa: T201 - this is what the test reads
         if ended:

@@ -12,6 +12,13 @@ from tests.contract.journal._postgresql import Server, asked
 
 Opener = Callable[..., Journal]
 
+ONE_DATABASE = pytest.mark.parametrize(
+    "location",
+    ["sqlite", pytest.param("postgresql", marks=pytest.mark.soak)],
+    indirect=True,
+)
+"""For what the two could not do differently: the rows that the other tests read are the same."""
+
 
 @pytest.fixture(params=["sqlite", "postgresql"])
 def location(request: pytest.FixtureRequest, tmp_path: Path) -> str:

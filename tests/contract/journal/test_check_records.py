@@ -13,17 +13,11 @@ from robolink.errors import JournalError
 from robolink.journal import Meetings, close_files, memory_journal, move_journal, open_journal
 from robolink.journal.store.check_rows import ClosedDay, problems_of_days
 from robolink.model import EntryKind, Identity, NewCheck, NewEntry, Signature
+from tests.contract.journal.conftest import ONE_DATABASE
 
 WELL = NewCheck("epson:C-1/R-1", "line3", True, "No problem found.", {"tools": {"1": [1.5]}})
 ILL = NewCheck("epson:C-2/R-2", "line4", False, "Needs attention: tool_changed.")
 FIRST_DAY = datetime.datetime(2026, 3, 1, 4, 5, tzinfo=datetime.UTC)
-
-ONE_DATABASE = pytest.mark.parametrize(
-    "location",
-    ["sqlite", pytest.param("postgresql", marks=pytest.mark.soak)],
-    indirect=True,
-)
-"""For what the two could not do differently: the rows that the other tests read are the same."""
 
 
 class Calendar(runtime.SystemRuntime):

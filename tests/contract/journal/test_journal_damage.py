@@ -6,6 +6,7 @@ import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -32,10 +33,13 @@ STATES: tuple[tuple[list[str], list[str]], ...] = (
 )
 
 
-def killed(location, how):
-    """Return the number of acknowledged steps for each statement at which the process is killed."""
+def killed(location, how, later=1):
+    """Return the number of acknowledged steps for each statement at which the process is killed.
+
+    Each run is killed ``later`` statements later than the one before.
+    """
     done = subprocess.run(
-        [sys.executable, "-m", "tests.contract.journal._killed", location, how],
+        [sys.executable, "-m", "tests.contract.journal._killed", location, how, str(later)],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -52,12 +56,17 @@ def state(journal, number):
     return [known.operation for known in log.open_markers()], kinds[::-1]
 
 
-def test_each_step_is_whole_or_was_never_begun(location, journal):
-    runs = killed(location, "again")
-    assert len(runs) > 20
+@pytest.mark.parametrize(
+    ("location", "later"),
+    [("sqlite", 1), ("postgresql", 3), pytest.param("postgresql", 1, marks=pytest.mark.soak)],
+    indirect=["location"],
+)
+def test_each_step_is_whole_or_was_never_begun(location, journal, later):
+    runs = killed(location, "again", later)
+    assert len(runs) > 20 / later
     assert runs == sorted(runs)
     assert runs[-1] == len(STEPS)
-    for number, acknowledged in enumerate(runs, start=1):
+    for number, acknowledged in zip(count(1, later), runs, strict=False):
         found = state(journal, number)
         # A step whose commit was under way may be done although it was not acknowledged.
         assert found in STATES[acknowledged : acknowledged + 2], number

@@ -10,6 +10,7 @@ from robolink.journal import ChainVerification, LeaseHolder
 from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, Identity, NewEntry, Signature
 from tests.contract.journal._acts import marker, run
+from tests.contract.journal.conftest import ONE_DATABASE
 
 # The journal's promises, the same on an SQLite file and on PostgreSQL.
 
@@ -55,22 +56,22 @@ QUESTIONS: tuple[dict[str, Any], ...] = (
     {"change": "c1"},
     {"change": ""},
     {"kinds": (EntryKind.DONE, EntryKind.WRITE)},
-    {"before": 700, "after": 100},
+    {"before": 570, "after": 100},
     {"controller": "cell-a", "kinds": (EntryKind.DONE,), "tool": 1, "change": "c2"},
 )
 
 
 def test_what_is_asked_for_is_found_in_either_order_and_up_to_the_limit(journal):
     kinds = list(EntryKind)
-    for number in range(2):
-        journal.log(CELLS[number]).append(
+    for cell, many in zip(CELLS, (550, 50), strict=True):
+        journal.log(cell).append(
             *(
                 NewEntry(kinds[n % 5], change=("", "c1", "c2")[n % 3], tool=(None, 1, 2, 3)[n % 4])
-                for n in range(600)
+                for n in range(many)
             )
         )
     everything = list(journal.entries(newest_first=False))
-    assert len(everything) == journal.count() == 1200
+    assert len(everything) == journal.count() == 600
 
     for question in QUESTIONS:
         wanted = [entry for entry in everything if is_wanted(entry, **question)]
@@ -169,6 +170,7 @@ def test_the_same_address_with_another_controller_shows_nothing_of_the_first(jou
     assert again.remarks == ()
 
 
+@ONE_DATABASE
 def test_another_address_of_a_known_controller_is_said_once(journal):
     met(journal, ROBOT_A).open_markers()
     for expected in (1, 0):
@@ -196,6 +198,7 @@ def test_what_stands_under_the_text_of_an_address_belongs_to_who_answers_there(j
     assert met(journal, ROBOT_B).names == (ROBOT_B,)
 
 
+@ONE_DATABASE
 def test_a_lease_under_the_text_of_an_address_goes_with_it(journal):
     journal.log(BY_NAME, holder=LeaseHolder(host="pc-1", pid=1, boot="b")).begin(marker("a"))
     log = met(journal, ROBOT_A, holder=LeaseHolder(host="pc-1", pid=2, boot="b"))
@@ -203,6 +206,7 @@ def test_a_lease_under_the_text_of_an_address_goes_with_it(journal):
         log.begin(marker("b"))
 
 
+@ONE_DATABASE
 def test_an_identity_that_becomes_known_takes_over_what_its_place_had(journal):
     met(journal, PLACE).begin(marker("a"))
     log = met(journal, ROBOT_A)
@@ -211,6 +215,7 @@ def test_an_identity_that_becomes_known_takes_over_what_its_place_had(journal):
     assert [known for known, _ in journal.open_markers()] == [ROBOT_A]
 
 
+@ONE_DATABASE
 def test_a_port_that_the_system_lends_passes_nothing_on(journal):
     lent = "epson+tcp://127.0.0.1:40001"
     journal.log(lent).begin(marker("a"))
@@ -220,6 +225,7 @@ def test_a_port_that_the_system_lends_passes_nothing_on(journal):
     assert [m.operation for m in met(journal, ROBOT_A, kept).open_markers()] == ["b"]
 
 
+@ONE_DATABASE
 def test_who_is_too_busy_to_tell_is_taken_for_whom_it_was_and_asked_again(journal):
     met(journal, ROBOT_A).begin(marker("a"))
     told = [
@@ -242,6 +248,7 @@ def told_in_turn(journal, *names):
     return log, untold
 
 
+@ONE_DATABASE
 def test_a_controller_is_not_asked_before_it_must_be_and_once_where_it_is_on_record(journal):
     for spare in (1, 2):
         log, untold = told_in_turn(journal, *[ROBOT_A] * 3)
@@ -254,6 +261,7 @@ def test_a_controller_is_not_asked_before_it_must_be_and_once_where_it_is_on_rec
         assert len(untold) == spare
 
 
+@ONE_DATABASE
 @pytest.mark.parametrize("before", ["", ROBOT_A, ROBOT_B])
 @pytest.mark.parametrize("told", [(BENT, ROBOT_A, ROBOT_A), (ROBOT_A, BENT, ROBOT_A)])
 def test_a_name_that_came_bent_hides_nothing_from_the_next_run(journal, before, told):
@@ -266,6 +274,7 @@ def test_a_name_that_came_bent_hides_nothing_from_the_next_run(journal, before, 
     assert not any(BENT in verdict for verdict in verdicts(journal))
 
 
+@ONE_DATABASE
 def test_a_controller_that_never_tells_the_same_name_twice_is_no_controller_on_record(journal):
     log, _ = told_in_turn(journal, ROBOT_A, BENT, ROBOT_B, ROBOT_A, ROBOT_A)
     with pytest.raises(RemoteProtocolError, match=f"{ROBOT_A}, {BENT}, {ROBOT_B}"):
@@ -276,6 +285,7 @@ def test_a_controller_that_never_tells_the_same_name_twice_is_no_controller_on_r
     assert [known for known, _ in journal.open_markers()] == [ROBOT_A]
 
 
+@ONE_DATABASE
 def test_a_name_that_a_busy_controller_does_not_tell_again_is_not_yet_its_name(journal):
     log, untold = told_in_turn(journal, ROBOT_A, PLACE, PLACE, ROBOT_A, ROBOT_A)
     log.open_markers()
@@ -284,6 +294,7 @@ def test_a_name_that_a_busy_controller_does_not_tell_again_is_not_yet_its_name(j
     assert untold == []
 
 
+@ONE_DATABASE
 def test_a_link_that_fails_while_asking_records_nothing(journal):
     def who():
         raise TransportTimeoutError("silence", remedy="none")
@@ -295,6 +306,7 @@ def test_a_link_that_fails_while_asking_records_nothing(journal):
     assert journal.open_markers() == ()
 
 
+@ONE_DATABASE
 def test_a_place_that_says_nothing_of_itself_is_told_once(journal):
     for expected in (1, 0):
         log = met(journal, PLACE)
@@ -364,6 +376,7 @@ def test_tool_1_of_each_robot_is_another_tool(journal):
     assert journal.verify().problems == ()
 
 
+@ONE_DATABASE
 def test_what_one_robot_left_open_holds_for_the_controller_and_names_the_robot(journal):
     robots_met(journal, SECOND).begin(marker("a"))
     log = robots_met(journal, ALONE)
@@ -375,6 +388,7 @@ def test_what_one_robot_left_open_holds_for_the_controller_and_names_the_robot(j
     assert values(robots_met(journal, SECOND)) == [[5]]
 
 
+@ONE_DATABASE
 def test_a_robot_that_was_alone_keeps_its_record_when_another_comes(journal):
     log = robots_met(journal, name=ALONE)
     log.append(kept(1))
@@ -390,6 +404,7 @@ def test_a_robot_that_was_alone_keeps_its_record_when_another_comes(journal):
     assert values(robots_met(journal, name=ALONE)) == [[1]]
 
 
+@ONE_DATABASE
 def test_another_robot_in_force_is_another_record_from_then_on(journal):
     log = robots_met(journal, ALONE)
     log.append(kept(1))
@@ -399,6 +414,7 @@ def test_another_robot_in_force_is_another_record_from_then_on(journal):
     assert journal.last_value(SECOND, 1).details["value"] == [2]
 
 
+@ONE_DATABASE
 @pytest.mark.parametrize("reading", [False, True])
 def test_a_shared_record_of_before_is_lost_to_nobody_and_taken_for_nobodys(
     location, open_anew, monkeypatch, reading

@@ -50,6 +50,13 @@ def served(cells):
         yield process, port
 
 
+@pytest.fixture(scope="module")
+def served_next(cells):
+    """The panel that follows one that was killed."""
+    with panel(cells[0]) as (process, port):
+        yield process, port
+
+
 def run(work):
     return asyncio.run(work)
 
@@ -186,8 +193,10 @@ def test_get_changes_nothing_and_every_page_of_a_cell_is_there(served):
         assert tablet.ask("GET", path)[0] in (404, 405), path
 
 
-def test_a_panel_that_is_killed_takes_its_job_along_in_order_and_the_next_shows_what_stands(cells):
-    file, url = cells
+def test_a_panel_that_is_killed_takes_its_job_along_in_order_and_the_next_shows_what_stands(
+    served, cells, request
+):
+    _, url = cells
 
     async def until_at_work(port):
         tablet = Tablet(port)
@@ -203,13 +212,13 @@ def test_a_panel_that_is_killed_takes_its_job_along_in_order_and_the_next_shows_
             await page.press_until(at_work, "choose", "1")
             return page.hello["server"], job_of(url)
 
-    with panel(file) as (process, port):
-        server, job = run(until_at_work(port))
-        assert job is not None
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        assert is_gone(job), "the job goes on without a panel"
-        assert job_of(url) is None
+    process, port = served
+    server, job = run(until_at_work(port))
+    assert job is not None
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert is_gone(job), "the job goes on without a panel"
+    assert job_of(url) is None
 
     async def look(port):
         again = Tablet(port)
@@ -220,12 +229,13 @@ def test_a_panel_that_is_killed_takes_its_job_along_in_order_and_the_next_shows_
             stopped = await again.post("/stop", cell="line3", press="k1", age_ms=0)
             return stopped[1]["outcome"]
 
-    with panel(file) as (_, port):
-        assert run(look(port)) == "stopped"
+    _, port = request.getfixturevalue("served_next")
+    assert run(look(port)) == "stopped"
 
 
-def test_the_end_of_a_panel_ends_its_jobs_first(cells):
+def test_the_end_of_a_panel_ends_its_jobs_first(served_next, cells):
     file, url = cells
+    process, port = served_next
 
     async def begin(port):
         tablet = Tablet(port)
@@ -235,9 +245,8 @@ def test_the_end_of_a_panel_ends_its_jobs_first(cells):
             await tablet.post("/start", cell="line3", job="change")
             await page.until(lambda page: page.screen != "idle")
 
-    with panel(file) as (process, port):
-        run(begin(port))
-        process.terminate()
-        assert process.wait(60) == 0
-        assert job_of(url) is None
-        assert os.path.exists(file)
+    run(begin(port))
+    process.terminate()
+    assert process.wait(60) == 0
+    assert job_of(url) is None
+    assert os.path.exists(file)

@@ -126,8 +126,7 @@ class PlcLink:
 
     def read_head(self) -> MailboxHead:
         """Read the head."""
-        words = self._exchange("read_head", self.plc.response)
-        return MailboxHead(words[1], words[2], words[3], words[7], words[9])
+        return self._exchange("read_head", self.plc.head)
 
     def read_response(self) -> tuple[int, ...]:
         """Read the response block."""

@@ -31,6 +31,7 @@ from robolink.protocols.mailbox import (
     kinematics_word,
     next_number,
 )
+from robolink.transport import MailboxHead
 
 MS = 1_000_000
 MOVE_NS = 500 * MS
@@ -180,20 +181,30 @@ class Plc:
     def response(self) -> tuple[int, ...]:
         """Return the response block."""
         self.advance()
-        beat = 1 if self.frozen else self.clock.now_ns() // (4 * MS) & 0xFFFF
-        return encode_response(replace(self.now, plc_heartbeat=beat))
+        return encode_response(replace(self.now, plc_heartbeat=self._heartbeat()))
+
+    def head(self) -> MailboxHead:
+        """Return what the head of the response block says."""
+        self.advance()
+        now = self.now
+        shown = (now.ack_head, now.state, now.error_class, now.group_state, self._heartbeat())
+        return MailboxHead(*map(int, shown))
+
+    def _heartbeat(self) -> int:
+        return 1 if self.frozen else self.clock.now_ns() // (4 * MS) & 0xFFFF
 
     def _show(self) -> None:
         moving = self._queue or self.now.bits & Bits.JOGGING
         state = self.now.group_state
         if state in (GroupState.STANDBY, GroupState.MOVING):
             state = GroupState.MOVING if moving else GroupState.STANDBY
-        self.now = replace(
-            self.now,
-            group_state=state,
-            queue_length=len(self._queue),
-            active_movement=self._queue[0][0] if self._queue else 0,
-        )
+        active = self._queue[0][0] if self._queue else 0
+        now = self.now
+        shown = (now.group_state, now.queue_length, now.active_movement)
+        if shown != (state, len(self._queue), active):
+            self.now = replace(
+                now, group_state=state, queue_length=len(self._queue), active_movement=active
+            )
 
     def _arrive(self, sequence: int, command: Command) -> None:
         error = ErrorClass.NONE

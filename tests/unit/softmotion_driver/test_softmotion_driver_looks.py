@@ -47,6 +47,7 @@ from robolink.protocols.mailbox import (
     next_number,
 )
 from robolink.timing import NS_PER_S
+from tests._rows import each_row
 from tests.unit.softmotion_driver import _plc
 from tests.unit.softmotion_driver._plc import MS, STRANGER
 
@@ -399,7 +400,7 @@ def test_a_movement_that_begins_where_there_is_no_number_is_waited_for(plc, grou
     assert move(group).wait(timeout_s=5) is MotionOutcome.ARRIVED
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("whole_s", "usual_s", "part_s"),
     [(0.0, 0.1, 0.0), (0.05, 0.1, 0.05), (0.124, 0.1, 0.124), (0.126, 0.1, 0.063), (0.3, 0.1, 0.1)],
 )
@@ -407,9 +408,7 @@ def test_a_time_is_shared_out_evenly(whole_s, usual_s, part_s):
     assert shared_out(whole_s, usual_s) == pytest.approx(part_s)
 
 
-@pytest.mark.parametrize(
-    ("distance", "seconds"), [(0.0, 0.0), (0.1, 0.1), (10.0, 1.0), (20.0, 1.5)]
-)
+@each_row(("distance", "seconds"), [(0.0, 0.0), (0.1, 0.1), (10.0, 1.0), (20.0, 1.5)])
 def test_the_shortest_time_of_a_way_is_that_of_its_speed_and_acceleration(distance, seconds):
     assert shortest_time_s(distance, (20.0, 40.0, 40.0, 80.0)) == pytest.approx(seconds)
 

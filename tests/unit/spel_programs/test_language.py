@@ -174,6 +174,15 @@ def test_scopes_are_local_module_and_global(cell):
     assert made.run() == ["0 2", "1 3", "0 3"]
 
 
+def test_a_file_that_is_included_twice_means_the_variables_of_each_place(cell):
+    made = cell(
+        'Integer m\nFunction main\nm = 1\n#include "a.inc"\nother\nFend\n'
+        'Function other\nInteger i, m\nm = 5\n#include "a.inc"\nFend\n',
+        files={"a.inc": "Print m + 1\n"},
+    )
+    assert made.run() == ["2", "6"]
+
+
 @pytest.mark.parametrize(("option", "second"), [("cleared", "1 2"), ("kept", "2 2")])
 def test_globals_keep_or_lose_their_values_at_a_start(cell, option, second):
     """Check 14 of programs: p. 351; Preserve keeps."""

@@ -94,9 +94,9 @@ def test_what_cannot_be_has_its_own_number(failure, line, number):
 
 def test_a_wait_beside_a_motion_sees_the_tip_come_in(printed):
     shown = printed(
-        HERE + " :X(150); Go P1",
+        HERE + " :X(60); Go P1",
         "Box 1, -40, 40, 0, 0, 0, 0",
-        "Move P1 :X(-150) !D0; Wait GetRobotInsideBox(1) = 1; On 1; Print CX(RealPos)!",
+        "Move P1 :X(-60) !D0; Wait GetRobotInsideBox(1) = 1; On 1; Print CX(RealPos)!",
         "Print Oport(1), InsideBox(1)",
         real_pos_noise_mm=0.0,
     )
@@ -107,14 +107,14 @@ def test_a_wait_beside_a_motion_sees_the_tip_come_in(printed):
 
 def test_a_trap_and_till_stop_where_the_tip_comes_in(printed):
     shown = printed(
-        HERE + " :X(150); Go P1",
+        HERE + " :X(60); Go P1",
         "Box 1, -40, 40, 0, 0, 0, 0",
         "Trap 1, GetRobotInsideBox(1) = 1 GoTo inside",
-        "Move P1 :X(-150)",
+        "Move P1 :X(-60)",
         "inside:",
         "Print CX(Here)",
         "Go P1",
-        "Move P1 :X(-150) Till GetRobotInsideBox(1) = 1",
+        "Move P1 :X(-60) Till GetRobotInsideBox(1) = 1",
         "Print CX(Here), TillOn",
         "Move P1 Find GetRobotInsideBox(1) = 0",
         "Print CX(FindPos), CX(Here)",
@@ -124,7 +124,7 @@ def test_a_trap_and_till_stop_where_the_tip_comes_in(printed):
     assert 20 < till[0] < 40
     assert till[1] == -1
     assert found[0] == pytest.approx(40, abs=0.01)
-    assert found[1] == pytest.approx(150)
+    assert found[1] == pytest.approx(60)
 
 
 def test_another_task_sees_it_and_each_robot_has_its_bit(cell):
@@ -133,9 +133,9 @@ def test_another_task_sees_it_and_each_robot_has_its_bit(cell):
             [
                 "Function main",
                 "Box 1, 1, -40, 40, 0, 0, 0, 0",
-                HERE + " :X(150); Go P1",
+                HERE + " :X(60); Go P1",
                 "Xqt watch",
-                "Move P1 :X(-150)",
+                "Move P1 :X(-60)",
                 "Fend",
                 "Function watch",
                 "Wait GetRobotInsideBox(1) = 1",

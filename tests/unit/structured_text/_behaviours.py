@@ -8,6 +8,7 @@ import json
 import math
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import pytest
@@ -51,12 +52,17 @@ READ_MODES = ("CURRENT", "ACTIVE", "LAST")
 
 def sources(kinematics="", profile=ExportProfile.FULL, change=lambda text: text, opcua=False):
     """Return the exported texts, altered by ``change``."""
-    texts = program_texts(profile, kinematics=kinematics, read_modes=READ_MODES, opcua=opcua)
+    texts = _exported(profile, kinematics, opcua)
     kinds = dict(PROGRAM_SOURCES)
     return [
         SourceText(name, change(text), kinds.get(name, TextDialect.CODESYS))
         for name, text in texts.items()
     ]
+
+
+@cache
+def _exported(profile, kinematics, opcua):
+    return program_texts(profile, kinematics=kinematics, read_modes=READ_MODES, opcua=opcua)
 
 
 def of_program(texts=None, *, opcua=False):

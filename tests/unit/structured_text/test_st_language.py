@@ -11,6 +11,7 @@ from robolink_simulators.structured_text import (
 )
 from robolink_simulators.structured_text.parse import INSTRUCTION_WORDS, RESERVED_WORDS
 
+from tests._rows import each_row
 from tests.unit.structured_text._bench import JUDGES, needs_judges, program, result
 
 # The subset of Structured Text: its meaning, and what is refused where.
@@ -47,7 +48,7 @@ MEANINGS = [
 ]
 
 
-@pytest.mark.parametrize(("body", "declared", "wanted"), MEANINGS)
+@each_row(("body", "declared", "wanted"), MEANINGS)
 def test_what_a_program_means(body, declared, wanted):
     assert result(body, declared) == wanted
 
@@ -84,7 +85,7 @@ BEYOND = [
 ]
 
 
-@pytest.mark.parametrize(("body", "declared", "line", "column"), [*DIFFERING, *BEYOND])
+@each_row(("body", "declared", "line", "column"), [*DIFFERING, *BEYOND])
 def test_what_is_refused_and_where(body, declared, line, column):
     with pytest.raises(StructuredTextError) as refusal:
         result(body, declared)
@@ -97,7 +98,7 @@ def test_a_refusal_says_what_was_expected():
         result("IF r = 1 r := 2; END_IF;")
 
 
-@pytest.mark.parametrize(
+@each_row(
     "body",
     [
         "r := 1 / r;",
@@ -218,7 +219,7 @@ def test_members_of_a_structure_may_begin_with_values_in_the_glue():
     assert begun("numbers : Numbers").value("Kept.numbers") == [0, [0, 0], 7]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "words"),
     [
         ("numbers : Numbers := (third := 1)", "no member third"),
@@ -261,16 +262,16 @@ def refusal_of(text, dialect):
     return refusal.value
 
 
-@pytest.mark.parametrize("dialect", list(TextDialect))
-@pytest.mark.parametrize("where", DECLARED)
-@pytest.mark.parametrize("name", ["bit", "BIT", "Real", "ltime", "adr", "Limit", "int_to_word"])
+@each_row("dialect", list(TextDialect))
+@each_row("where", DECLARED)
+@each_row("name", ["bit", "BIT", "Real", "ltime", "adr", "Limit", "int_to_word"])
 def test_no_name_is_a_keyword_or_a_type_of_codesys(name, where, dialect):
     error = refusal_of(DECLARED[where].format(name=name), dialect)
     assert f"{name} is a keyword or data type of CODESYS" in str(error)
     assert (error.place.file, error.place.line) == ("mine.st", LINE)
 
 
-@pytest.mark.parametrize("name", ["to_word", "a__b", "DWORD_TO_DINT", "atan2", "xsizeof", "class"])
+@each_row("name", ["to_word", "a__b", "DWORD_TO_DINT", "atan2", "xsizeof", "class"])
 def test_conversions_operators_and_two_underscores_are_no_names(name):
     for dialect in TextDialect:
         error = refusal_of(DECLARED["variable"].format(name=name), dialect)
@@ -278,14 +279,14 @@ def test_conversions_operators_and_two_underscores_are_no_names(name):
         assert error.place.line == LINE
 
 
-@pytest.mark.parametrize("name", ["en", "Ton", "len", "priority", "Single", "ends_"])
+@each_row("name", ["en", "Ton", "len", "priority", "Single", "ends_"])
 def test_what_the_standard_alone_reserves_is_refused_in_the_common_subset(name):
     text = DECLARED["variable"].format(name=name)
     assert f"not every compiler takes the name {name}" in str(refusal_of(text, COMMON))
     StructuredProgram([SourceText("mine.st", text, CODESYS)], "Main")
 
 
-@pytest.mark.parametrize("name", ["bits", "beat", "to_do", "words_to_lreal", "bit_", "inbit", "r"])
+@each_row("name", ["bits", "beat", "to_do", "words_to_lreal", "bit_", "inbit", "r"])
 def test_a_name_that_only_looks_like_one_is_taken(name):
     text = DECLARED["variable"].format(name=name)
     StructuredProgram([SourceText("mine.st", text, CODESYS)], "Main")

@@ -37,19 +37,25 @@ class Broker:
         return f"mqtt://127.0.0.1:{self.port}/robots"
 
     def start(self):
-        command = [str(MOSQUITTO), "-c", str(self.file)]
-        self.process = subprocess.Popen(
-            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
+        self._begin()
         until = time.monotonic() + 20
         while True:
             try:
                 socket.create_connection(("127.0.0.1", self.port), timeout=1).close()
             except OSError:
                 assert time.monotonic() < until, "the broker did not start"
+                if self.process.poll() is not None:
+                    # While it was away, another process had its port for a moment.
+                    self._begin()
                 time.sleep(0.01)
             else:
                 return self
+
+    def _begin(self):
+        command = [str(MOSQUITTO), "-c", str(self.file)]
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
 
     def stop(self):
         self.process.kill()

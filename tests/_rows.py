@@ -46,6 +46,24 @@ def each_row(
     return decorate
 
 
+def in_turn(rows: Iterable[Any], columns: Iterable[Any], name: Callable[[Any], str]) -> list[Any]:
+    """Return each pair of a row and a column; every second one, as on a chessboard, is for soak.
+
+    Args:
+        rows: The first of each pair.
+        columns: The second.
+        name: Names a row in the test's id.
+    """
+    columns = tuple(columns)
+    return [
+        pytest.param(
+            row, column, id=f"{name(row)}-{column}", marks=pytest.mark.soak if (r + c) % 2 else ()
+        )
+        for r, row in enumerate(rows)
+        for c, column in enumerate(columns)
+    ]
+
+
 def _values(row: Any, columns: tuple[str, ...]) -> tuple[Any, ...]:
     assert not isinstance(row, _MARKED), "a row with marks is a test of its own"
     return tuple(row) if len(columns) > 1 else (row,)

@@ -13,6 +13,7 @@ from robolink_cli.console.output import visible
 
 from robolink.errors import RobolinkError
 from robolink.protocols.epson_text import VariableType
+from tests._rows import in_turn
 
 EVIL = "ok\x1b[2J\x1b]0;x\x07\x9b31m\x08\r\x7fend"
 OBEYED = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
@@ -40,19 +41,7 @@ def evil(simulator):
     return simulator
 
 
-@pytest.mark.parametrize(
-    ("command", "fault"),
-    [
-        pytest.param(
-            command,
-            fault,
-            id=f"{' '.join(command)}-{fault}",
-            marks=pytest.mark.soak if (row + column) % 2 else (),
-        )
-        for row, command in enumerate(OF_CONTROLLERS)
-        for column, fault in enumerate([True, False])
-    ],
-)
+@pytest.mark.parametrize(("command", "fault"), in_turn(OF_CONTROLLERS, [True, False], " ".join))
 def test_no_word_of_a_controller_is_obeyed(run, evil, command, fault):
     if fault:
         evil.panel.raise_error(4002)

@@ -30,6 +30,7 @@ from robolink.messages import tr
 from robolink.model import MarkerKind
 from robolink.stopping import find_note, leave_note
 from robolink.transport import far_end_of
+from tests._rows import in_turn
 from tests.cli.wizard._people import HEADER
 
 # A "Next" line never names the command that was refused just now.
@@ -70,17 +71,7 @@ SAID = (
 
 
 @pytest.mark.parametrize(
-    ("kind", "command"),
-    [
-        pytest.param(
-            kind,
-            command,
-            id=f"{kind.__name__}-{command}",
-            marks=pytest.mark.soak if (row + column) % 2 else (),
-        )
-        for row, kind in enumerate(REFUSED)
-        for column, command in enumerate(["recover", "resolve"])
-    ],
+    ("kind", "command"), in_turn(REFUSED, ["recover", "resolve"], lambda kind: kind.__name__)
 )
 def test_recover_refused_never_proposes_recover_alone(kind, command, monkeypatch, capsys):
     texts = iter(SAID)

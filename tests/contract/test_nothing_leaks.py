@@ -2,7 +2,6 @@
 
 import json
 import os
-import socket
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -15,14 +14,9 @@ from robolink import ToolOffset
 from robolink.controllers import PlcMapController
 from robolink.errors import OutcomeUnknownError
 from robolink.testing import confirm_whole_map
+from tests._ports import free_port
 
 LOST = 'schema = "robolink/faults/1"\nlink = "{link}"\n[[fault]]\naction = "drop_reply"\n'
-
-
-def free_port():
-    with socket.socket() as held:
-        held.bind(("127.0.0.1", 0))
-        return held.getsockname()[1]
 
 
 @contextmanager

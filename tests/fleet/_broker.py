@@ -12,14 +12,10 @@ import pytest
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
+from tests._ports import free_port
+
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin:/usr/bin:/usr/local/bin")
 NEEDED = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto (a Debian package) is missing")
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
 
 
 class Broker:
@@ -44,9 +40,7 @@ class Broker:
                 socket.create_connection(("127.0.0.1", self.port), timeout=1).close()
             except OSError:
                 assert time.monotonic() < until, "the broker did not start"
-                if self.process.poll() is not None:
-                    # While it was away, another process had its port for a moment.
-                    self._begin()
+                assert self.process.poll() is None, "it ended at once"
                 time.sleep(0.01)
             else:
                 return self

@@ -27,7 +27,8 @@ from robolink.fleet import CellState, PlantNotes
 from robolink.fleet.plant_view import mqtt_feed
 from robolink.fleet.plant_view.metrics import PlantMetrics, metrics_served
 from robolink.fleet.plant_view.mqtt_feed import MqttFeed, broker_of
-from tests.fleet._broker import NEEDED, Broker, Listener, free_port
+from tests._ports import free_port
+from tests.fleet._broker import NEEDED, Broker, Listener
 
 pytestmark = pytest.mark.soak
 

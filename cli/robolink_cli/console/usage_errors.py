@@ -6,7 +6,7 @@ as the words that were too many, is read out of it by click's own template.
 """
 
 import re
-from gettext import gettext
+from gettext import gettext, ngettext
 from typing import Any, Final
 
 import click
@@ -219,29 +219,36 @@ def _about_path(message: str, kind: click.Path) -> tuple[str, str]:
 def _refused_value(message: str, kind: "click.ParamType[Any]") -> str | None:
     """Return the value, as it is shown, that one of click's own messages is about."""
     if isinstance(kind, click.Choice):
-        templates = ["{value!r} is not one of {choices}.", "{value!r} is not {choice}."]
+        templates = _counted("{value!r} is not {choice}.", "{value!r} is not one of {choices}.")
     elif isinstance(kind, click.DateTime):
-        templates = [
-            "{value!r} does not match the formats {formats}.",
+        templates = _counted(
             "{value!r} does not match the format {format}.",
-        ]
+            "{value!r} does not match the formats {formats}.",
+        )
     else:
-        templates = [
-            "{value} is not in the range {range}.",
-            "{value!r} is not a valid {number_type}.",
-        ]
+        templates = (
+            gettext("{value} is not in the range {range}."),
+            gettext("{value!r} is not a valid {number_type}."),
+        )
     for template in templates:
-        if (value := _found(gettext(template), message, "value")) is not None:
+        if (value := _found(template, message, "value")) is not None:
             return value.removesuffix(".0") if "{value}" in template else value
     return None
 
 
 def _extra_words(message: str) -> str:
-    templates = (
-        "Got unexpected extra argument ({args})",
-        "Got unexpected extra arguments ({args})",
+    templates = _counted(
+        "Got unexpected extra argument ({args})", "Got unexpected extra arguments ({args})"
     )
-    return next(filter(None, (_found(gettext(one), message, "args") for one in templates)), "")
+    return next(filter(None, (_found(one, message, "args") for one in templates)), "")
+
+
+def _counted(singular: str, plural: str) -> tuple[str, str]:
+    """Return both forms of a template that click chooses by a number.
+
+    Not every gettext finds them under their own text: that of Python 3.11.2 does not.
+    """
+    return ngettext(singular, plural, 2), ngettext(singular, plural, 1)
 
 
 def _found(template: str, message: str, name: str) -> str | None:

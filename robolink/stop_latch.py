@@ -135,6 +135,11 @@ class StopLatch:
                 self._under_way -= 1
                 self._stops.notify_all()
 
+    @property
+    def under_way(self) -> bool:
+        """Whether a stop is in progress, in whatever thread."""
+        return self._under_way > 0
+
     def await_stops(self, timeout_s: float) -> None:
         """Let stops in progress in other threads end before the link is closed."""
         with self._stops:

@@ -38,6 +38,12 @@ _TRIES: Final = 3
 """Number of attempts to stop. A stop may be repeated: after a lost answer, or if another client
 overwrote it in a mailbox, the robot must not go on moving."""
 
+_REFUSED_NS: Final = 1_000_000_000
+"""Time in ns for which a mailbox is asked again that refuses to be looked at."""
+
+_AGAIN_S: Final = 0.04
+"""Time between two such attempts, in s."""
+
 
 def stop_now(
     url: "str | Controller",
@@ -88,21 +94,24 @@ def stop_now(
     given = password if isinstance(password, str) else password.reveal() if password else ""
     patience_s = timeout_s if login_s is None else min(login_s, timeout_s)
     means = _Means(given, timeout_s, patience_s, clock, met, runtime.random_number(32))
-    for tries_left in reversed(range(_TRIES)):
+    tries_left = _TRIES
+    refused_until_ns = runtime.monotonic_ns() + _REFUSED_NS
+    while True:
         try:
             with told_to(trace):
                 status = stop(link, means)
             _LOG.decided("stop acknowledged: it rests", controller=link.identity, request="stop")
             return status
         except (TransportError, RemoteProtocolError) as error:
+            tries_left -= 1
             if isinstance(error, ConnectError) or not tries_left:
                 raise
         except RejectedError as error:
             # A PLC that is busy for a moment refuses a look. A password is never tried again.
             by_mailbox = link.kind == "softmotion" and not isinstance(error, LoginRefusedError)
-            if not by_mailbox or not tries_left:
+            if not by_mailbox or runtime.monotonic_ns() >= refused_until_ns:
                 raise
-    raise AssertionError  # the last try returns or raises
+            runtime.sleep(_AGAIN_S)
 
 
 def stop_requests(url: str) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from robolink.errors import RobolinkError
 from robolink.model import MarkerKind, ToolOffset, ToolReceipt
 from robolink.timing import wall_label
 
-StandIn = Callable[..., Any]
+StandIn = Callable[..., Any] | property
 
 
 def found(place: str) -> tuple[Any, str]:
@@ -217,6 +217,9 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     ),
     "robolink.controllers.softmotion.commands.CommandSender._before": (
         lambda sender, _draft: sender._snapshots.take()
+    ),
+    "robolink.controllers.softmotion.wire.MailboxWire._may_beat": property(
+        lambda wire: wire._attends or not wire.motions.unfinished
     ),
     "robolink.controllers.ToolWrite.change": _changed,
     "robolink.controllers.ToolTableCore.require_writable": _nothing,

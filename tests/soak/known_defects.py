@@ -44,6 +44,7 @@ _NOTERS: Final = (
     "robolink.transaction._change",
 )
 _WIRE: Final = "robolink.controllers.softmotion.wire.MailboxWire.ended"
+_ANSWERS: Final = "robolink.controllers.softmotion.answers"
 _COMMANDS: Final = "robolink.controllers.softmotion.commands"
 _SENDER: Final = f"{_COMMANDS}.CommandSender"
 _CORE: Final = "robolink.controllers.controller_core.ControllerCore"
@@ -180,7 +181,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "another client's acknowledgement is taken for ours",
-        {f"{_COMMANDS}.is_own": stand_ins.owner_not_compared},
+        {f"{_ANSWERS}.is_own": stand_ins.owner_not_compared},
         CellKind.SOFTMOTION,
         found_by="users of EPICS asyn",
     ),

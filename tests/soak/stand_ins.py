@@ -17,9 +17,10 @@ from robolink.controllers.epson.controller import EpsonController
 from robolink.controllers.epson.group import EpsonGroup
 from robolink.controllers.epson.session import EpsonSession, command_class_of
 from robolink.controllers.markers import MarkerStore
+from robolink.controllers.softmotion.answers import Fate
 from robolink.controllers.softmotion.commands import CommandSender
 from robolink.controllers.tool_table import ToolTableCore
-from robolink.errors import RobolinkError, TransportTimeoutError
+from robolink.errors import RobolinkError
 from robolink.journal._lease import Grip, Lease
 from robolink.journal.store import connection
 from robolink.model import (
@@ -156,12 +157,10 @@ def forgotten_selection(preserver: Any, marker: Marker) -> None:
     preserver._link.markers.clear(marker)
 
 
-def written_again_after_silence(sender: Any, command: Any, before: Any, *, again: bool) -> Any:
+def written_again_after_silence(sender: Any, command: Any, before: Any, *until: Any) -> Any:
     """Take silence for a damaged block, which may be written again."""
-    try:
-        return _await_acknowledgement(sender, command, before, again=again)
-    except TransportTimeoutError:
-        return before, False
+    now, fate = _await_acknowledgement(sender, command, before, *until)
+    return now, Fate.DAMAGED if fate is Fate.UNSEEN else fate
 
 
 _await_acknowledgement = CommandSender._await_acknowledgement

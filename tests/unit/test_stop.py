@@ -11,7 +11,7 @@ from robolink.checkpoints import Checkpoint, checkpoint, observed
 from robolink.controllers.epson.line import EpsonConversation, text_line
 from robolink.controllers.epson.rest import REST_S, bring_to_rest
 from robolink.controllers.epson.session import command_class_of
-from robolink.controllers.softmotion.commands import command_class_of as class_of_command
+from robolink.controllers.softmotion.answers import command_class_of as class_of_command
 from robolink.errors import (
     BusyError,
     NotReadyError,

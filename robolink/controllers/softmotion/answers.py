@@ -1,5 +1,6 @@
 """What an answer of the PLC is about, and the meaning of its refusals and ends, with remedies."""
 
+from enum import Enum, auto
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -24,6 +25,7 @@ from robolink.protocols.mailbox import (
     Response,
     error_meaning,
 )
+from robolink.stop_latch import CommandClass
 
 _FAULTS: Final = frozenset({6, 7, 9})
 """Hundreds of error classes that mean a failure, not a refusal."""
@@ -37,6 +39,42 @@ DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
 
 _OUTSIDE_MOTION_TASK: Final = 12108
 """ErrorID of a movement block called by another task (docs/reference/softmotion.md 1.4)."""
+
+
+_CLASSES: Final = {
+    Opcode.OWNERSHIP: CommandClass.LOOK,
+    Opcode.READ_TOOL: CommandClass.LOOK,
+    Opcode.READ_INPUT: CommandClass.LOOK,
+    Opcode.STOP: CommandClass.CALM,
+    Opcode.HALT: CommandClass.CALM,
+    Opcode.INTERRUPT: CommandClass.CALM,
+    Opcode.RESET: CommandClass.RESET,
+    Opcode.DISABLE: CommandClass.CALM,
+    Opcode.SELECT_TOOL: CommandClass.RESTORE,
+    Opcode.WRITE_TOOL: CommandClass.WRITE,
+    Opcode.CLEAR_TOOL: CommandClass.WRITE,
+}
+"""Class of opcodes that do not act; every other opcode acts."""
+
+
+def command_class_of(command: Command) -> CommandClass:
+    """Return what ``command`` does.
+
+    An end of a jog, both masks 0, calms. To release a held stop, 2003 with i0 = 1, is to reset it.
+    """
+    if command.opcode == Opcode.STOP and command.operands[0]:
+        return CommandClass.RESET
+    if command.opcode == Opcode.JOG and not any(command.operands[:2]):
+        return CommandClass.CALM
+    return _CLASSES.get(Opcode(command.opcode), CommandClass.ACT)
+
+
+_ENDS: Final = (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
+
+
+def has_ended(state: int) -> bool:
+    """Whether a state is one of the three ends; numbers of a newer PLC are not."""
+    return state in _ENDS
 
 
 class Ended(NamedTuple):
@@ -96,6 +134,71 @@ def came_too_early(command: Command, before: Response, now: Response) -> bool:
     """
     early = Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY)
     return early in now.finished and early not in before.finished
+
+
+class Fate(Enum):
+    """What a snapshot shows of a block that was written."""
+
+    TAKEN = auto()
+    """It is acknowledged."""
+
+    HIDDEN = auto()
+    """Another client's command is, in its place or since."""
+
+    DAMAGED = auto()
+    """The PLC counts one more damaged block."""
+
+    UNSEEN = auto()
+    """Nothing of it is shown."""
+
+
+def fate_of(command: Command, before: Response, now: Response) -> Fate:
+    """Return what a snapshot shows of a block.
+
+    Args:
+        command: What was written.
+        before: A snapshot from before it.
+        now: That from after it. Another client's command that was acknowledged between them may be
+            older, or hide that this one was.
+
+    Raises:
+        RejectedError: It came while the PLC was busy, and will not be carried out.
+    """
+    if is_own(command, now) or has_taken(command, now):
+        return Fate.TAKEN
+    if came_too_early(command, before, now):
+        raise refused(command, now, ErrorClass.BUSY)
+    if is_in_its_place(command, before, now):
+        return Fate.HIDDEN
+    return Fate.DAMAGED if now.rejected != before.rejected else Fate.UNSEEN
+
+
+_OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
+"""Commands whose end a second stop or halt may hide: it has the same effect, and the stop is
+confirmed by reading."""
+
+
+def end_of(command: Command, now: Response) -> Ended | None:
+    """Return how a command ended that was acknowledged; ``None`` while it has not.
+
+    Raises:
+        RemoteProtocolError: Another client's command hides it.
+        UnclearAnswerError: A stop or halt of this client hides it.
+    """
+    if is_own(command, now):
+        if not has_ended(now.state):
+            return None
+        return Ended(command, now.state, now.error_class, now)
+    if has_taken(command, now):
+        return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
+    if now.ack_owner != command.owner:
+        raise overtaken(command, now)
+    # Our own stop or halt, from another thread, was accepted after this command.
+    ends = (end for end in now.finished if end.sequence == command.sequence)
+    end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+    if end is None and command.opcode not in _OVERTAKEN:
+        raise unseen_end(command)
+    return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
 
 
 def has_taken(command: Command, now: Response) -> bool:
@@ -174,6 +277,19 @@ def silence(said: str) -> TransportTimeoutError:
     return TransportTimeoutError(
         said,
         remedy=tr("Look at the PLC; the command may still be carried out."),
+    )
+
+
+def unacknowledged(command: Command) -> TransportTimeoutError:
+    """Return the error for a command of which no look showed what became of it."""
+    return silence(tr("{request!r} was not acknowledged.", request=describe(command)))
+
+
+def damaged(command: Command) -> RemoteProtocolError:
+    """Return the error for a block that the PLC refused as damaged each time."""
+    return RemoteProtocolError(
+        tr("{request!r} arrived damaged each time.", request=describe(command)),
+        remedy=tr("Look for a gateway that changes registers, or a bad line."),
     )
 
 

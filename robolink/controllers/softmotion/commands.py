@@ -10,8 +10,9 @@ not acknowledged ours. Never after a time-out.
 
 What only ends a movement may be repeated (docs/reference/stopping.md 1), and waits for no look: its
 block is built on the last snapshot of the session. It is written again also where the far end
-refuses to take it, and once, as a new command, where it got lost or is hidden behind another
-client's; a stop also where no look showed what became of it.
+refuses to take it, and as a new command where it got lost or is hidden behind another client's; a
+stop also where no look showed what became of it. None of that ends the session: the next stop goes
+out too. What waits to be acknowledged when a stop comes leaves the lock to it.
 
 Stop (opcode 2003) needs neither ownership nor the machine's permit (docs/reference/mailbox.md,
 "What ends by itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2).
@@ -30,28 +31,30 @@ from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion.answers import (
     DISPOSSESSED,
     Ended,
-    came_too_early,
+    Fate,
+    command_class_of,
     command_ended_early,
+    damaged,
     describe,
-    has_taken,
-    is_in_its_place,
-    is_own,
+    end_of,
+    fate_of,
     motion_failure,
     overtaken,
     refused,
     silence,
+    unacknowledged,
     unconfirmed_stop,
-    unseen_end,
 )
 from robolink.controllers.softmotion.ownership import Bystanders, Ownership
 from robolink.controllers.softmotion.snapshots import Snapshots
-from robolink.controllers.softmotion.wire import MailboxWire, has_ended
+from robolink.controllers.softmotion.wire import ErrorT, MailboxWire
 from robolink.errors import (
     Concerning,
     ConfigError,
     ControllerError,
     RejectedError,
     RemoteProtocolError,
+    RobolinkError,
     StoppedError,
 )
 from robolink.messages import tr
@@ -68,36 +71,7 @@ from robolink.protocols.mailbox import (
     encode_command,
     next_number,
 )
-from robolink.stop_latch import CommandClass
 from robolink.timing import Deadline
-
-_CLASSES: Final = {
-    Opcode.OWNERSHIP: CommandClass.LOOK,
-    Opcode.READ_TOOL: CommandClass.LOOK,
-    Opcode.READ_INPUT: CommandClass.LOOK,
-    Opcode.STOP: CommandClass.CALM,
-    Opcode.HALT: CommandClass.CALM,
-    Opcode.INTERRUPT: CommandClass.CALM,
-    Opcode.RESET: CommandClass.RESET,
-    Opcode.DISABLE: CommandClass.CALM,
-    Opcode.SELECT_TOOL: CommandClass.RESTORE,
-    Opcode.WRITE_TOOL: CommandClass.WRITE,
-    Opcode.CLEAR_TOOL: CommandClass.WRITE,
-}
-"""Class of opcodes that do not act; every other opcode acts."""
-
-
-def command_class_of(command: Command) -> CommandClass:
-    """Return what ``command`` does.
-
-    An end of a jog, both masks 0, calms. To release a held stop, 2003 with i0 = 1, is to reset it.
-    """
-    if command.opcode == Opcode.STOP and command.operands[0]:
-        return CommandClass.RESET
-    if command.opcode == Opcode.JOG and not any(command.operands[:2]):
-        return CommandClass.CALM
-    return _CLASSES.get(Opcode(command.opcode), CommandClass.ACT)
-
 
 REST_S: Final = 5.0
 """Longest time from the stop to a confirmed stop state, in s (docs/reference/rules.md 5)."""
@@ -130,10 +104,17 @@ _APART: Final = 64
 """Least distance of the number of what only ends a movement from the last one that is known. The
 PLC takes a number up to 32767 above the last that it took, so that 250 lost ones do no harm."""
 
+_LOST_S: Final = 0.25
+"""Time in s after which what only ends a movement, and was not acknowledged, is written again."""
+
+_REFUSED_S: Final = 1.0
+"""Time in s for which a stop is tried again that the far end refuses to take."""
+
+_GRANTED_S: Final = 0.1
+"""Time in s for which another command may still be acknowledged before a stop that came meanwhile
+goes out."""
+
 _WRITES: Final = 3
-_OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
-"""Commands whose end a second stop or halt may hide: it has the same effect, and the stop is
-confirmed by reading."""
 
 
 class CommandSender:
@@ -155,6 +136,7 @@ class CommandSender:
         self._snapshots = snapshots
         self._lock = runtime.reentrant_lock()
         self._last = 0
+        self._unclear: RobolinkError | None = None
         self.ownership = Ownership(wire, self._to_end, bystanders or Bystanders())
 
     def carry_out(self, draft: Command) -> Response:
@@ -203,18 +185,19 @@ class CommandSender:
         restless = partial(unconfirmed_stop, self._wire.identity, REST_S)
         shown = partial(self._shown, deadline=deadline)
         try:
-            try:
-                done = self.stop()
-            except RemoteProtocolError as refusal:
-                if not self._wire.alive:
-                    raise
-                shown(partial(snapshots.news, snapshots.latest), refusal=refusal)
-                done = shown(self.stop)
-            now = shown(snapshots.take)
-            while not done(now):
-                if deadline.expired:
-                    raise restless()
-                now = shown(partial(snapshots.news, now))
+            while True:
+                try:
+                    done = self.stop()
+                    now = shown(snapshots.take)
+                    while not done(now):
+                        if deadline.expired:
+                            raise restless()
+                        now = shown(partial(snapshots.news, now))
+                    break
+                except RemoteProtocolError as refusal:
+                    if not self._wire.alive:
+                        raise
+                    shown(partial(snapshots.news, snapshots.latest), refusal=refusal)
             # A stop from another thread ends ours before the group has stopped.
             stands = not now.bits & Bits.BUSY
         except RejectedError as error:
@@ -327,20 +310,10 @@ class CommandSender:
         return end
 
     def _end_of(self, command: Command, now: Response) -> Ended | None:
-        if is_own(command, now):
-            if not has_ended(now.state):
-                return None
-            return Ended(command, now.state, now.error_class, now)
-        if has_taken(command, now):
-            return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
-        if now.ack_owner != command.owner:
-            raise self._wire.ended(overtaken(command, now))
-        # Our own stop or halt, from another thread, was accepted after this command.
-        ends = (end for end in now.finished if end.sequence == command.sequence)
-        end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
-        if end is None and command.opcode not in _OVERTAKEN:
-            raise unseen_end(command)
-        return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
+        try:
+            return end_of(command, now)
+        except RemoteProtocolError as hidden:
+            raise self._doubtful(command, hidden) from None
 
     def _send(
         self,
@@ -353,6 +326,8 @@ class CommandSender:
         """Write a command and return it with the snapshot that acknowledges it."""
         request = describe(draft)
         with self._exchanging(request):
+            if self._unclear is not None and not draft.only_ends:
+                raise self._wire.ended(self._unclear)
             before = self._allowed(draft, require)
             command = self._addressed(draft, before)
             words = self._encode(command)
@@ -372,34 +347,65 @@ class CommandSender:
         self, command: Command, before: Response, words: Words, *, ride: bool
     ) -> tuple[Command, Response]:
         """Write a block; return it as it was acknowledged, with the snapshot that shows that."""
-        admit = partial(self._admit, command, ride=ride)
-        fresh = command.only_ends
-        for last in (*(False,) * (_WRITES - 1), True):
+        deadline = Deadline.after(self._wire.clock, self._patience_s(command))
+        written, closings = 0, self._wire.latch.closings
+        while True:
+            written += 1
             try:
-                admit()  # before an error of the link can hide a stop; again as the block leaves
-                self._wire.write(words, admit)
-            except (RejectedError, StoppedError) as error:
-                self._wire.motions.forget(command.sequence)
-                if last or not command.only_ends or isinstance(error, StoppedError):
-                    raise
-                continue  # it was not done, and a stop may be repeated
-            again, fresh = fresh and not last, False
-            try:
-                before, accepted = self._await_acknowledgement(command, before, again=again)
-            except RejectedError:
+                self._write(command, words, ride=ride)
+                before, fate = self._await_acknowledgement(command, before, deadline, closings)
+            except (RejectedError, StoppedError):
                 self._wire.motions.forget(command.sequence)
                 raise
-            if accepted:
+            if fate is Fate.TAKEN:
                 return command, before
-            if again:  # it may have been done unseen; then its number counts no more
+            if deadline.expired or not (command.only_ends or fate is Fate.DAMAGED):
+                break
+            if command.only_ends:  # it may have been done unseen: its number counts no more
                 command = self._addressed(command, before)
                 words = self._encode(command)
-        raise self._wire.ended(
-            RemoteProtocolError(
-                tr("{request!r} arrived damaged each time.", request=describe(command)),
-                remedy=tr("Look for a gateway that changes registers, or a bad line."),
-            )
-        )
+                if written > 1:
+                    self._wire.clock.sleep(_AGAIN_S)
+            elif written == _WRITES:
+                break
+        fates = {Fate.DAMAGED: damaged(command), Fate.HIDDEN: overtaken(command, before)}
+        unproved = fates.get(fate) or unacknowledged(command)
+        if self._wire.latch.closings != closings and not command.only_ends:
+            self._unclear = unproved  # a stop waits for the lock; nothing else follows this
+            raise unproved
+        raise self._doubtful(command, unproved)
+
+    def _doubtful(self, command: Command, error: ErrorT) -> ErrorT:
+        """Return the error for what may have been done; no stop ends a session by itself.
+
+        If a command to end a movement fails, it must be possible to send a stronger one.
+        """
+        return error if command.only_ends else self._wire.ended(error)
+
+    def _patience_s(self, command: Command) -> float:
+        """Return how long a command may take to be acknowledged."""
+        return min(self._wire.timeout_s, REST_S) if command.only_ends else self._wire.timeout_s
+
+    def _write(self, command: Command, words: Words, *, ride: bool) -> None:
+        """Write a block; what only ends a movement again where the far end refused: it is undone.
+
+        Raises:
+            RejectedError: Refused; a stop for :data:`_REFUSED_S`.
+        """
+        admit = partial(self._admit, command, ride=ride)
+        stop = command.opcode == Opcode.STOP
+        patience = Deadline.after(self._wire.clock, _REFUSED_S if stop else 0.0)
+        tries = _WRITES if command.only_ends else 1
+        while True:
+            try:
+                admit()  # before an error of the link can hide a stop; again as the block leaves
+                return self._wire.write(words, admit)
+            except RejectedError:
+                tries -= 1
+                if tries <= 0 and patience.expired:
+                    raise
+            if tries <= 0:
+                self._wire.clock.sleep(_AGAIN_S)
 
     def _allowed(self, draft: Command, require: Require | None) -> Response:
         """Return the snapshot from before a command, which allows it (docs/reference/rules.md 1).
@@ -438,34 +444,26 @@ class CommandSender:
             checkpoint(Checkpoint.EXCHANGE, request)
 
     def _await_acknowledgement(
-        self, command: Command, before: Response, *, again: bool
-    ) -> tuple[Response, bool]:
-        """Return the snapshot that shows the acknowledgement of a block, or that it got lost.
+        self, command: Command, before: Response, deadline: Deadline, closings: int
+    ) -> tuple[Response, Fate]:
+        """Return the snapshot that shows what became of a block, and that; or that none does.
 
-        Another client's that was acknowledged since ``before`` may be older, or hide that ours was;
-        where ours can be written ``again``, that is told like one that got lost.
+        A stop that came since the latch had these ``closings`` shortens the wait.
         """
-        most_s = min(self._wire.timeout_s, REST_S) if command.only_ends else self._wire.timeout_s
-        deadline = Deadline.after(self._wire.clock, most_s)
-        now = before
+        lost_s = _LOST_S if command.only_ends else self._wire.timeout_s
+        lost = Deadline.after(self._wire.clock, lost_s)
+        now, granted = before, False
         if not command.only_ends:
             self._wire.pause(_ACCEPTANCE_S)
         while True:
-            now = self._snapshots.news(now)
-            if is_own(command, now) or has_taken(command, now):
-                return now, True
-            if came_too_early(command, before, now):
-                raise refused(command, now, ErrorClass.BUSY)
-            if is_in_its_place(command, before, now):
-                if again:
-                    return now, False
-                raise self._wire.ended(overtaken(command, now))
-            if now.rejected != before.rejected:
-                return now, False
-            if deadline.expired:
-                late = silence(tr("{request!r} was not acknowledged.", request=describe(command)))
-                # If a command to end a movement fails, it must be possible to send a stronger one.
-                raise late if command.only_ends else self._wire.ended(late)
+            now = self._snapshots.news(now, wait_s=_GRANTED_S)
+            fate = fate_of(command, before, now)
+            if fate is not Fate.UNSEEN or lost.expired or deadline.expired:
+                return now, fate
+            stopped = self._wire.latch.closings != closings
+            if stopped and granted and not command.only_ends:
+                return now, fate
+            granted = stopped
 
     def _addressed(self, draft: Command, before: Response) -> Command:
         taken = {before.ack_head, before.active_movement}

@@ -9,6 +9,7 @@ from robolink.controllers.softmotion.answers import (
     DISPOSSESSED,
     command_ended_early,
     describe,
+    has_ended,
     is_own,
 )
 from robolink.controllers.softmotion.commands import Require
@@ -16,7 +17,6 @@ from robolink.controllers.softmotion.condition import is_moving
 from robolink.controllers.softmotion.heartbeat import LOOK_S
 from robolink.controllers.softmotion.mailbox import Mailbox
 from robolink.controllers.softmotion.movement import factors, straight
-from robolink.controllers.softmotion.wire import has_ended
 from robolink.errors import (
     ConfigError,
     ControllerError,

@@ -27,6 +27,7 @@ from robolink.errors import (
     MotionTimeoutError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -46,6 +47,9 @@ from robolink.transport import MailboxHead
 
 _REST_S = 1.0
 """Longest time from the end of a movement to the stop of its group, in s."""
+
+_ANSWERS = frozenset(ErrorClass) - {ErrorClass.NONE}
+"""Refusals of the PLC itself; what stands before it refuses with other numbers."""
 
 _LOOKS_APART = 10
 """Time between whole looks while nothing is new, in times that a whole look takes on the line."""
@@ -126,11 +130,7 @@ class SoftMotionMotion:
         ):
             if self._end is None and mailbox.wire.motions.end_of(self.command.sequence) is None:
                 self._halted = True
-                # The movement may have just ended by itself or by a stop; wait for its end. A stop
-                # under way ends it too, and a halt after that would only hide the end of the stop.
-                if not mailbox.wire.latch.closed:
-                    with suppress(RejectedError, ControllerFaultError):
-                        mailbox.commands.carry_out(Command(0, Opcode.HALT))
+                self._halt()
             if not self._watch(Deadline.after(mailbox.wire.clock, _HALT_S)):
                 raise mailbox.wire.ended(
                     TransportTimeoutError(
@@ -140,6 +140,32 @@ class SoftMotionMotion:
                 )
             self._take_end()
         self._await_rest()
+
+    def _halt(self) -> None:
+        """Halt the group; stop it where a stop got lost before, or the PLC answers no halt.
+
+        The movement may have just ended by itself or by a stop. A stop under way ends it too, and a
+        halt after that would only hide the end of the stop.
+        """
+        mailbox = self._mailbox
+        mailbox.wire.motions.give_up()
+        if mailbox.wire.latch.under_way:
+            return
+        if not mailbox.wire.latch.closed:
+            try:
+                mailbox.commands.carry_out(Command(0, Opcode.HALT))
+            except ControllerFaultError:
+                return
+            except RejectedError as refusal:
+                if refusal.code in _ANSWERS:
+                    return
+            except (TransportTimeoutError, RemoteProtocolError, StoppedError):
+                if not mailbox.wire.alive:
+                    raise
+            else:
+                return
+        with suppress(RejectedError):
+            mailbox.commands.bring_to_rest()
 
     def await_end(self, timeout_s: float) -> Finished:
         """Wait for the end, whatever it is; raises like :meth:`wait` except for how it ended."""

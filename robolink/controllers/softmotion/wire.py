@@ -18,6 +18,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, TypeVar
 
 from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.controllers.softmotion.answers import has_ended
 from robolink.controllers.softmotion.heartbeat import (
     PAUSED_BEAT_S,
     ClientHeartbeat,
@@ -36,7 +37,7 @@ from robolink.errors import (
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.package_log import PackageLog
-from robolink.protocols.mailbox import CommandState, Finished, Response
+from robolink.protocols.mailbox import Finished, Response
 from robolink.stop_latch import StopLatch
 from robolink.timing import AnswerTimes, Deadline
 from robolink.transport import MailboxHead, MailboxLink
@@ -56,6 +57,7 @@ class MotionTracker:
     def __init__(self, owner: int) -> None:
         self._owner = owner
         self._ends: dict[int, Finished | None] = {}
+        self._given_up: list[int] = []
         self.jogging = False
 
     @property
@@ -77,6 +79,15 @@ class MotionTracker:
     def unread(self) -> bool:
         """Whether there are movements whose end nobody has read."""
         return bool(self._ends)
+
+    def give_up(self) -> None:
+        """Keep nothing going that is under way now: it is to end, whatever becomes of the halt."""
+        self._given_up = [sequence for sequence, end in self._ends.items() if end is None]
+
+    @property
+    def given_up(self) -> bool:
+        """Whether the end of a movement that was given up is still to be seen."""
+        return any(self.holds(one) and self.end_of(one) is None for one in self._given_up)
 
     def require_room(self, request: str) -> None:
         """Refuse a fifth movement.
@@ -129,14 +140,6 @@ class MotionTracker:
             and not now.queue_length
             and (now.ack_head, now.ack_owner) != (sequence, self._owner)
         )
-
-
-def has_ended(state: int) -> bool:
-    """Whether a state is one of the three ends; numbers of a newer PLC are not."""
-    return state in _ENDS
-
-
-_ENDS: Final = (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
 
 
 _LOG: Final = PackageLog(__package__)
@@ -271,9 +274,9 @@ class MailboxWire:
     def attended(self) -> Iterator[None]:
         """Wait on what is unfinished: the exchanges of this thread keep it going meanwhile.
 
-        Nothing else does. A thread that only looks, or a program that does something else, would
-        else keep a robot moving that nobody watches (docs/reference/mailbox.md, "What ends by
-        itself").
+        Nothing else does, and nothing behind a stop. A thread that only looks, or a program that
+        does something else, would else keep a robot moving that nobody watches
+        (docs/reference/mailbox.md, "What ends by itself").
         """
         if self._attends:
             yield
@@ -365,7 +368,14 @@ class MailboxWire:
 
     @property
     def _may_beat(self) -> bool:
-        return self._attends or not self.motions.unfinished
+        """Whether this thread's beats are no mistake: they keep going what is unfinished.
+
+        Behind a stop nobody wants it to go on, and a stop that gets lost is not the last word: the
+        PLC halts what is no longer kept going.
+        """
+        if not self.motions.unfinished:
+            return True
+        return self._attends and not self.latch.closed and not self.motions.given_up
 
     def _ask(self, exchange: Callable[[], T], *, long: bool = False, awaited: bool = True) -> T:
         """Do an exchange after a beat; on a serial line a long one always has one before it."""

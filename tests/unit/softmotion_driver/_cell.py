@@ -95,6 +95,10 @@ class PlcLink:
         self.plan(method, held.append)
         return lambda: held.pop()()
 
+    def forget_plans(self) -> None:
+        """Let everything arrive from now on."""
+        self._mishaps.clear()
+
     def before(self, method: str, act: Callable[[], object], *, nth: int = 1) -> None:
         """Run something just before the nth request arrives."""
 

@@ -4,6 +4,7 @@ No look stands before what only ends a movement: its block is built on the last 
 session. What begins something still needs a look of its own.
 """
 
+import itertools
 import threading
 from dataclasses import replace
 from functools import partial
@@ -32,6 +33,7 @@ from robolink.protocols.mailbox import (
     Finished,
     GroupState,
     Opcode,
+    decode_command,
 )
 from robolink.stopping import _asking
 from tests.unit.softmotion_driver._cell import PlcLink
@@ -237,15 +239,61 @@ def test_a_stop_that_another_client_hides_is_confirmed_at_once(cell, plc, contro
     assert first != second
 
 
-def test_a_stop_that_is_overwritten_again_is_unproved(cell, plc, controller):
-    for number in (901, 902):
+@pytest.mark.parametrize("refused_first", [0, 2])
+def test_a_stop_that_is_overwritten_again_and_again_is_written_until_it_is_taken(
+    cell, plc, controller, refused_first
+):
+    for _ in range(refused_first):
+        cell.link.refuse("write_command")
+    for number in range(901, 905):
         cell.link.hold_up("write_command")
         cell.link.before("read_head", partial(another, plc, (number, Opcode.HALT)))
-    with pytest.raises(RemoteProtocolError, match="another client") as unproved:
+    begun_ns = plc.clock.now_ns()
+    controller.stop()
+    assert plc.clock.now_ns() - begun_ns < 300 * MS
+    assert plc.opcodes() == [Opcode.STOP]
+    assert len(cell.link.sent) == refused_first + 5
+
+
+def test_a_stop_that_is_overwritten_for_ever_is_unproved_and_the_next_goes_out(
+    cell, plc, controller
+):
+    write, others = cell.link.write_command, itertools.count(901)
+
+    def overwritten(words, admit=lambda: None):
+        cell.link.hold_up("write_command")
+        write(words, admit)
+        another(plc, (next(others), Opcode.HALT))
+
+    cell.link.write_command = overwritten
+    begun_ns = plc.clock.now_ns()
+    with pytest.raises(OutcomeUnknownError, match="could not confirm") as unproved:
         controller.stop()
+    assert REST_S <= (plc.clock.now_ns() - begun_ns) / (1000 * MS) < REST_S + 4
     assert "emergency stop" in unproved.value.remedy
-    assert len(cell.link.sent) == 2
     assert plc.executed == []
+    cell.link.write_command = write
+    controller.stop()
+    assert plc.opcodes() == [Opcode.STOP]
+
+
+@pytest.mark.parametrize("opcode", [Opcode.STOP, Opcode.HALT, Opcode.INTERRUPT, Opcode.JOG])
+@pytest.mark.parametrize("times", [1, 3])
+def test_what_ends_a_movement_and_got_lost_is_written_again(cell, plc, opcode, times):
+    controller = open_softmotion(cell.link, outcomes=cell.outcomes, timeout_s=3.0)
+    controller.take()
+    plc.executed.clear()
+    cell.link.sent.clear()
+    for _ in range(times):
+        cell.link.hold_up("write_command")  # written, and the PLC never sees it
+    begun_ns = plc.clock.now_ns()
+    if opcode == Opcode.STOP:
+        controller.stop()
+    else:
+        controller._mailbox.commands.carry_out(Command(0, opcode))
+    assert plc.clock.now_ns() - begun_ns < times * 450 * MS
+    assert plc.opcodes() == [opcode]
+    assert len({decode_command(words).sequence for words in cell.link.sent}) == len(cell.link.sent)
 
 
 @pytest.mark.parametrize("opcode", [Opcode.STOP, Opcode.HALT, Opcode.INTERRUPT, Opcode.JOG])
@@ -290,16 +338,6 @@ def test_a_stop_that_waited_long_for_its_turn_is_looked_for_once(cell, plc, cont
     assert plc.opcodes() == [Opcode.STOP]
 
 
-def test_a_stop_that_is_overwritten_at_its_last_writing_is_unproved(cell, plc, controller):
-    cell.link.refuse("write_command")
-    cell.link.refuse("write_command")
-    cell.link.hold_up("write_command")
-    cell.link.before("read_head", lambda: another(plc, (901, Opcode.HALT)))
-    with pytest.raises(RemoteProtocolError, match="another client"):
-        controller.stop()
-    assert plc.executed == []
-
-
 def test_a_damaged_stop_is_written_again(cell, plc, controller):
     damages = iter([lambda words: (*words[:20], words[20] ^ 1, *words[21:])])
     cell.link.command = lambda words: next(damages, tuple)(words)
@@ -308,21 +346,44 @@ def test_a_damaged_stop_is_written_again(cell, plc, controller):
     assert plc.opcodes() == [Opcode.STOP]
 
 
-@pytest.mark.parametrize(("busy", "sent"), [(1, 2), (2, 3), (3, 3)])
-def test_a_stop_that_the_far_end_refuses_to_take_is_tried_three_times(
-    cell, plc, controller, busy, sent
-):
-    """A refused write was not done, and no look gives a busy server time any more."""
+@pytest.mark.parametrize("busy", [1, 2, 3, 12])
+def test_a_stop_that_the_far_end_refuses_to_take_is_tried_again(cell, plc, controller, busy):
+    """A refused write was not done. The first two follow at once, the others 40 ms apart."""
     for _ in range(busy):
         cell.link.refuse("write_command")
-    if busy == sent:
+    begun_ns = plc.clock.now_ns()
+    controller.stop()
+    assert (plc.clock.now_ns() - begun_ns) / MS < 40 * max(0, busy - 2) + 30
+    assert plc.opcodes() == [Opcode.STOP]
+    assert len(cell.link.sent) == busy + 1
+
+
+def test_a_stop_that_the_far_end_never_takes_is_refused_and_the_next_is_tried_too(
+    cell, plc, controller
+):
+    for _ in range(ALWAYS):
+        cell.link.refuse("write_command")
+    for _ in range(2):
+        cell.link.sent.clear()
+        begun_ns = plc.clock.now_ns()
         with pytest.raises(RejectedError, match="busy") as failure:
             controller.stop()
         assert "emergency stop" in failure.value.remedy
-    else:
-        controller.stop()
-        assert plc.opcodes() == [Opcode.STOP]
-    assert len(cell.link.sent) == sent
+        assert 1.0 <= (plc.clock.now_ns() - begun_ns) / (1000 * MS) < 1.2
+        assert 20 < len(cell.link.sent) < 40
+
+
+@pytest.mark.parametrize("opcode", [Opcode.HALT, Opcode.INTERRUPT, Opcode.JOG])
+def test_a_weaker_end_that_is_refused_leaves_time_for_a_stop(cell, plc, controller, opcode):
+    controller.take()
+    cell.link.sent.clear()
+    for _ in range(ALWAYS):
+        cell.link.refuse("write_command")
+    begun_ns = plc.clock.now_ns()
+    with pytest.raises(RejectedError, match="busy"):
+        controller._mailbox.commands.carry_out(Command(0, opcode))
+    assert plc.clock.now_ns() - begun_ns < 20 * MS
+    assert len(cell.link.sent) == 3
 
 
 def test_what_does_not_only_end_something_is_never_written_again(cell, plc, controller):

@@ -7,10 +7,11 @@ import math
 import signal
 import threading
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
-from robolink.controllers import Jog
+from robolink.controllers import Jog, open_softmotion
 from robolink.controllers.softmotion.heartbeat import Turns
 from robolink.errors import (
     BusyError,
@@ -22,7 +23,9 @@ from robolink.errors import (
     NotReadyReason,
     OutcomeUnknownError,
     RejectedError,
+    RobolinkError,
     StoppedError,
+    TransportTimeoutError,
 )
 from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, Pose, Verdict, WorkBox
 from robolink.protocols.mailbox import (
@@ -217,6 +220,113 @@ def test_a_stop_from_another_thread_ends_the_wait(cell, plc, controller, group):
         motion.wait(timeout_s=5)
     assert stopped
     assert plc.now.group_state == GroupState.STOPPING
+
+
+def signs_of_life(cell):
+    """Return how many different heartbeat words the PLC has been sent, alone or with a command."""
+    return len({*cell.link.beats, *(words[62] for words in cell.link.sent)})
+
+
+def test_a_movement_whose_stop_got_lost_is_kept_going_by_nothing(cell, plc, monkeypatch):
+    """Its waiter looks on; the PLC hears no new heartbeat and halts it."""
+    monkeypatch.setattr(_plc, "MOVE_NS", 3000 * MS)
+    controller = open_softmotion(cell.link, outcomes=cell.outcomes, timeout_s=0.2)
+    controller.take()
+    plc.executed.clear()
+    motion, heard = move(controller.groups[0]), []
+
+    def stop_in_vain():
+        for _ in range(100):
+            cell.link.hold_up("write_command")
+        with pytest.raises(RobolinkError):
+            controller.stop()
+        heard.append(signs_of_life(cell))
+
+    def press():
+        thread = threading.Thread(target=stop_in_vain)
+        thread.start()
+        thread.join()
+
+    cell.link.before("beat", press, nth=2)
+    with pytest.raises(StoppedError):
+        motion.wait(timeout_s=5)
+    assert plc.now.finished[0].error_class == ErrorClass.HEARTBEAT_LOST
+    assert signs_of_life(cell) - heard[0] <= 1  # the beat that was on its way
+    assert plc.opcodes() == [Opcode.MOVE_LINEAR]
+
+
+@pytest.mark.parametrize("lost", ["refused", "lost"])
+def test_ctrl_c_whose_halt_does_not_get_through_stops_the_group(cell, plc, group, lost):
+    motion = move(group)
+
+    def ctrl_c():
+        for _ in range(3 if lost == "refused" else 2):
+            if lost == "refused":
+                cell.link.refuse("write_command")
+            else:
+                cell.link.hold_up("write_command")
+        raise KeyboardInterrupt
+
+    cell.link.before("beat", ctrl_c, nth=2)
+    with pytest.raises(KeyboardInterrupt):
+        motion.wait(timeout_s=5)
+    assert plc.opcodes()[-1] in (
+        (Opcode.STOP,) if lost == "refused" else (Opcode.HALT, Opcode.STOP)
+    )
+    assert plc.now.group_state != GroupState.MOVING
+
+
+@pytest.mark.parametrize("at", ["write_command", "read_head", "read_response"])
+def test_ctrl_c_inside_a_stop_lets_it_out_and_nothing_goes_on(cell, plc, controller, group, at):
+    motion = move(group)
+    cell.link.before(at, partial(signal.raise_signal, signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        controller.stop()
+    assert plc.opcodes() == [Opcode.MOVE_LINEAR, Opcode.STOP]
+    with pytest.raises(StoppedError):
+        motion.wait(timeout_s=5)
+    controller.close()
+    assert plc.opcodes() == [Opcode.MOVE_LINEAR, Opcode.STOP, Opcode.OWNERSHIP]
+    assert plc.now.group_state == GroupState.STOPPING
+
+
+def test_closing_after_a_stop_that_was_refused_stops_what_nobody_waited_on(
+    cell, plc, controller, group
+):
+    move(group)
+    for _ in range(40):
+        cell.link.refuse("write_command")
+    with pytest.raises(RejectedError):
+        controller.stop()
+    cell.link.forget_plans()
+    assert plc.opcodes() == [Opcode.MOVE_LINEAR]
+    controller.close()
+    assert plc.opcodes() == [Opcode.MOVE_LINEAR, Opcode.STOP, Opcode.OWNERSHIP]
+
+
+@pytest.mark.parametrize("pressed", ["as it is written", "later", "at its end"])
+def test_what_waits_to_be_acknowledged_leaves_the_lock_to_a_stop(
+    cell, plc, controller, group, pressed
+):
+    """Its block got lost; nobody knows, so behind it nothing but stops follows."""
+    if pressed == "as it is written":
+        cell.link.plan("write_command", lambda _deliver: controller.latch.close())
+    else:
+        cell.link.hold_up("write_command")
+        at = 2 if pressed == "later" else 13
+        cell.link.before("read_head", controller.latch.close, nth=at)
+    begun_ns = plc.clock.now_ns()
+    with pytest.raises(OutcomeUnknownError):
+        move(group)
+    if pressed != "at its end":
+        assert plc.clock.now_ns() - begun_ns < 300 * MS
+    assert len(cell.open_requests()) == 1
+    controller.stop()
+    assert plc.opcodes() == [Opcode.STOP]
+    controller.release_stop()
+    with pytest.raises(TransportTimeoutError, match="not acknowledged"):
+        controller.release_hold()
+    assert plc.opcodes() == [Opcode.STOP]
 
 
 def test_a_stop_that_another_one_ended_is_told_when_the_axes_stand(cell, plc, controller):

@@ -318,7 +318,8 @@ def test_a_stop_that_only_an_earlier_command_answers_is_not_confirmed(cell, plc,
     with pytest.raises(OutcomeUnknownError):
         controller.io.set_output(5, 1)
     cell.link.before("read_head", take_the_output)
-    cell.link.hold_up("write_command")
+    for _ in range(100):
+        cell.link.hold_up("write_command")
     with pytest.raises(TransportTimeoutError, match="not acknowledged") as unconfirmed:
         controller.stop()
     assert "press the emergency stop" in unconfirmed.value.remedy

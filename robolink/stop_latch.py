@@ -12,6 +12,7 @@ tool, power and speed at the end of a procedure, and one roll-back of each tool 
 How long a call waits for another thread, program or person stands here too: a stop ends the wait.
 """
 
+import itertools
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -39,7 +40,6 @@ __all__ = [
     "StopLatch",
 ]
 
-
 _STOP_ENDS_S: Final = 10.0
 """Longest wait in s for the end of a stop before it is released: five to rest, and its link."""
 
@@ -66,6 +66,13 @@ class CommandClass(Enum):
     """Any other command: it moves, starts a program, or switches motors or an output on."""
 
 
+class _Permits(threading.local):
+    """What a thread may do under a stop."""
+
+    restoring = writing = False
+    calms: int | None = None
+
+
 class StopLatch:
     """Open until somebody stops; closed until somebody releases it.
 
@@ -75,11 +82,12 @@ class StopLatch:
 
     def __init__(self, controller: str) -> None:
         self._controller = controller
-        self._closed = self._severed = False
-        self._closings = 0
+        self._severed = False
+        self._count = itertools.count(1)
+        self._closings = self._released = 0
         self._stops = runtime.waiting_room()
         self._under_way = 0
-        self._permits = threading.local()
+        self._permits = _Permits()
         self._put_back: set[int] = set()
         self._tell: Callable[[str], None] | None = None
 
@@ -89,8 +97,8 @@ class StopLatch:
 
     @property
     def closed(self) -> bool:
-        """Whether a stop is active."""
-        return self._closed
+        """Whether a stop is active: it has closed since it was released, or for good."""
+        return self._closings != self._released or self._severed
 
     @property
     def closings(self) -> int:
@@ -100,12 +108,12 @@ class StopLatch:
     @property
     def restores(self) -> bool:
         """Whether this thread is restoring earlier settings."""
-        return self._permit("restoring")
+        return self._permits.restoring
 
     def close(self) -> None:
         """Refuse everything from now on; never waits."""
-        self._closings += 1
-        self._closed = True
+        # A number that no two threads share: a release never opens what closes just then.
+        self._closings = next(self._count)
 
     @property
     def severed(self) -> bool:
@@ -116,8 +124,7 @@ class StopLatch:
         """Close it for good; never waits. Nothing is restored or put back any more either.
 
         For who cuts off a thread that hangs: whenever that one wakes up, it finds a controller
-        that somebody else may have recovered meanwhile. What stops, and looks, is still let
-        through.
+        that somebody else may have recovered meanwhile. What stops, and looks, still passes.
         """
         self._severed = True
         self.close()
@@ -149,19 +156,22 @@ class StopLatch:
         """Release the latch at a person's request, once the stops in progress have ended.
 
         A movement that began while another thread still stops would be met by that stop halfway.
+        Only what the person knew of is released: stops of before, in :meth:`calming` before it.
 
         Raises:
-            StoppedError: A stop does not end.
+            StoppedError: A stop does not end, or another one came meanwhile.
         """
+        known = self._closings if self._permits.calms is None else self._permits.calms
         with self._stops:
             if not self._stops.wait_for(lambda: not self._under_way, _STOP_ENDS_S):
-                raise StoppedError(
-                    tr("{controller} is still being stopped.", controller=self._controller),
-                    remedy=tr("Look at the robot. Release the stop when it has ended."),
-                    controller=self._controller,
-                )
+                said = tr("{controller} is still being stopped.", controller=self._controller)
+                remedy = tr("Look at the robot. Release the stop when it has ended.")
+                raise self._stopped(said, remedy=remedy)
+            if self._closings != known:
+                said = tr("{controller} was stopped once more.", controller=self._controller)
+                raise self._stopped(said)
             self._put_back.clear()
-            self._closed = self._severed
+            self._released = known
 
     def admit(self, kind: CommandClass, request: str) -> None:
         """Refuse ``request`` if a stop forbids it; called under the lock of its exchange.
@@ -169,15 +179,14 @@ class StopLatch:
         Raises:
             StoppedError: It was not sent.
         """
-        if self._closed:
+        if self._closings != self._released or self._severed:
             self._require_admitted(kind, request)
         if self._tell is not None:
             self._tell(request)
 
     def _require_admitted(self, kind: CommandClass, request: str) -> None:
-        if kind in (CommandClass.LOOK, CommandClass.CALM):
-            return
-        if not self._severed and self._is_permitted(kind):
+        free = kind in (CommandClass.LOOK, CommandClass.CALM)
+        if free or (not self._severed and self._is_permitted(kind)):
             return
         said = tr("{request} was not sent: the controller was stopped.", request=request)
         raise self._stopped(said, request)
@@ -185,10 +194,10 @@ class StopLatch:
     def _is_permitted(self, kind: CommandClass) -> bool:
         """Whether this thread resets, restores or puts back on purpose."""
         if kind is CommandClass.RESET:
-            return self._permits.__dict__.get("calms") == self._closings
+            return self._permits.calms == self._closings
         if kind is CommandClass.RESTORE:
-            return self.restores
-        return kind is CommandClass.WRITE and self._permit("writing")
+            return self._permits.restoring
+        return kind is CommandClass.WRITE and self._permits.writing
 
     def require_open(self, request: str) -> None:
         """Refuse to start, or to continue, an operation of several exchanges.
@@ -198,7 +207,7 @@ class StopLatch:
         Raises:
             StoppedError: A stop is active.
         """
-        if self._closed and not self.restores:
+        if self.closed and not self.restores:
             raise self._stopped(tr("{request}: ended by a stop.", request=request), request)
 
     def require_unstopped(self, since: int, request: str) -> None:
@@ -242,9 +251,9 @@ class StopLatch:
         Raises:
             StoppedError: A stop came meanwhile.
         """
-        permits, closed = self._permits.__dict__, self._closed
-        before = permits.get("calms")
-        began = permits["calms"] = self._closings if before is None else before
+        permits, closed = self._permits, self.closed
+        before = permits.calms
+        began = permits.calms = self._closings if before is None else before
         try:
             if closed:
                 yield
@@ -254,7 +263,7 @@ class StopLatch:
             if self._closings != began:
                 self.require_open(request)
         finally:
-            permits["calms"] = before
+            permits.calms = before
 
     @contextmanager
     def restoring(self) -> Iterator[None]:
@@ -273,23 +282,21 @@ class StopLatch:
         Raises:
             StoppedError: That was done since the stop already.
         """
-        if self._closed and tool in self._put_back:
+        if self.closed and tool in self._put_back:
             self.admit(CommandClass.ACT, tr("Tool {tool}, put back once more,", tool=tool))
-        before = self._permit("writing")
+        before = self._permits.writing
         self._permits.writing = True
         try:
             with self.restoring():
                 yield
         finally:
             self._permits.writing = before
-            if self._closed:
+            if self.closed:
                 self._put_back.add(tool)
 
-    def _permit(self, name: str) -> bool:
-        return bool(self._permits.__dict__.get(name))
-
-    def _stopped(self, said: str, request: str) -> StoppedError:
-        remedy = tr("The robot will not move by itself. When the cell is clear, release the stop.")
+    def _stopped(self, said: str, request: str = "", *, remedy: str = "") -> StoppedError:
+        usual = tr("The robot will not move by itself. When the cell is clear, release the stop.")
+        remedy = remedy or usual
         return StoppedError(said, remedy=remedy, controller=self._controller, request=request)
 
 
@@ -326,8 +333,7 @@ LONGEST_WAIT_S: Final = 86_400.0
 """Longest wait for a turn, in s: a day."""
 
 LOOK_S: Final = 0.1
-"""Interval, while waiting, between checks for a stop, for Ctrl-C, and for the end of the wait, in
-s."""
+"""Interval, while waiting, between checks for a stop, for Ctrl-C, and for the end, in s."""
 
 T = TypeVar("T")
 
@@ -350,12 +356,7 @@ def require_wait(wait_s: float) -> float:
 
 
 class _Calling:
-    """The state of a thread's call for a block. No generator: every call to a driver passes here.
-
-    Args:
-        calls: Has the state of each thread.
-        state: That of the call.
-    """
+    """The state of a thread's call for a block. No generator: each call to a driver passes here."""
 
     __slots__ = ("_before", "_calls", "_state")
 

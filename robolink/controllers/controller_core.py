@@ -5,7 +5,7 @@ read. Markers, latch, ledger, recovery, and what happens at the end of a connect
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
@@ -14,7 +14,7 @@ from robolink.controller_outcome import note_outcome
 from robolink.controllers.driver_link import DriverLink, DriverPart, advise_emergency_stop
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.resolving import MarkerResolver
-from robolink.errors import RobolinkError
+from robolink.errors import RemoteProtocolError, RobolinkError, TransportError
 from robolink.model import (
     Act,
     AlarmList,
@@ -212,22 +212,39 @@ class ControllerCore(DriverPart, ABC):
         """Stop everything; from any thread, at any time, more than once.
 
         From its first instant on no movement, jog, write or program start leaves this process until
-        :meth:`release_stop`; whoever is at work gets StoppedError.
+        :meth:`release_stop`; whoever is at work gets StoppedError. Where an answer was lost, and
+        the session with it, the stop goes out over a new link.
 
         Raises:
             OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
             RobolinkError: It was not confirmed; the message says the same.
         """
-        self.latch.close()
+        with self.latch.stopping():
+            try:
+                self._bring_to_rest()
+            except RobolinkError as error:
+                advise_emergency_stop(error)
+                raise
+        self._driver.decided("stop acknowledged: it rests", str(Act.STOP))
+
+    def _bring_to_rest(self) -> None:
+        """Stop all groups: over a new link where an answer was lost that the session needed."""
+        if not self.groups:
+            raise self._driver.lacks(str(Act.STOP))
         try:
-            if not self.groups:
-                raise self._driver.lacks(str(Act.STOP))
             for group in self.groups:
                 group.stop()
-        except RobolinkError as error:
-            advise_emergency_stop(error)
-            raise
-        self._driver.decided("stop acknowledged: it rests", str(Act.STOP))
+        except (TransportError, RemoteProtocolError):
+            if self._closed or not self._driver.stopped_anew():
+                raise
+
+    def stops_anew(self, stop: Callable[[], object]) -> None:
+        """Let a stop whose session is over go out over a new link.
+
+        Args:
+            stop: Stops the controller over a link of its own.
+        """
+        self._driver.stop_anew = stop
 
     def release_stop(self) -> None:
         """Release a stop at a person's request: this process may act again."""

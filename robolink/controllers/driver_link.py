@@ -163,6 +163,7 @@ class DriverLink:
         markers: The durable markers of what was begun.
         change_guard: Refuses writes that move a tip farther than the cell allows.
         lock: One procedure at a time.
+        stop_anew: Stops it over a link of its own; ``None`` where there is no other.
 
     Args:
         identity: Which controller.
@@ -199,8 +200,31 @@ class DriverLink:
         self.markers = MarkerStore(identity, outcomes, latch, simulated=lambda: self.simulated)
         self.change_guard = ChangeGuard(outcomes, latch)
         self.lock = ProcedureLock(identity, latch, outcomes)
+        self.stop_anew: Callable[[], object] | None = None
         self._gate = gate
+        self._anew = runtime.lock()
         self._waiting: list[None] = []
+
+    @property
+    def session_over(self) -> bool:
+        """Whether the link has ended for good, so that nothing more is sent over it."""
+        return False
+
+    def stopped_anew(self) -> bool:
+        """Stop it over a link of its own, if the session is over and there can be another link.
+
+        Returns:
+            Whether it rests now.
+
+        Raises:
+            RobolinkError: Whether it stops is not known.
+        """
+        if not self.session_over or self.stop_anew is None:
+            return False
+        self.decided("the session is over; stopped over a new link", "Stop")
+        with self._anew:  # one after another: a controller may answer one login only
+            self.stop_anew()
+        return True
 
     @property
     def simulated(self) -> bool:

@@ -6,47 +6,25 @@ What is imported inside the functions below is needed afterwards, or for one kin
 only.
 """
 
-from contextlib import suppress
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING
 
 from robolink import runtime
-from robolink.errors import (
-    Concerning,
-    ConnectError,
-    LoginRefusedError,
-    RejectedError,
-    RemoteProtocolError,
-    RobolinkError,
-    TransportError,
-)
+from robolink.controllers.stop_attempts import StopMeans, attempted
+from robolink.errors import RejectedError
 from robolink.messages import tr
-from robolink.package_log import PackageLog
-from robolink.transport import LinkUrl, parse_url, told_to
+from robolink.transport import LinkUrl, parse_url
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robolink.controllers.epson.line import EpsonConversation
-    from robolink.controllers.softmotion.wire import MailboxWire
+    from robolink.controllers.stop_attempts import StopWay
     from robolink.model import Controller, ControllerStatus, Secret
     from robolink.timing import Clock
     from robolink.transport import TraceSink
 
-_LOG: Final = PackageLog(__package__)
-
-_TRIES: Final = 3
-"""Number of attempts to stop. A stop may be repeated: after a lost answer, or if another client
-overwrote it in a mailbox, the robot must not go on moving."""
-
-_REFUSED_NS: Final = 1_000_000_000
-"""Time in ns for which a mailbox is asked again that refuses to be looked at."""
-
-_AGAIN_S: Final = 0.04
-"""Time between two such attempts, in s."""
-
 
 def stop_now(
-    url: "str | Controller",
+    url: "str | LinkUrl | Controller",
     *,
     password: "str | Secret | None" = None,
     timeout_s: float = 3.0,
@@ -85,33 +63,27 @@ def stop_now(
         >>> stop_now("epson+sim://stop-example").state.value
         'ready'
     """
-    if not isinstance(url, str):
+    if not isinstance(url, (str, LinkUrl)):
         url.stop()
         return url.status()
-    link = parse_url(url)
-    kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
-    stop = kinds.get(link.kind, _stop_other)
+    link = parse_url(url) if isinstance(url, str) else url
     given = password if isinstance(password, str) else password.reveal() if password else ""
     patience_s = timeout_s if login_s is None else min(login_s, timeout_s)
-    means = _Means(given, timeout_s, patience_s, clock, met, runtime.random_number(32))
-    tries_left = _TRIES
-    refused_until_ns = runtime.monotonic_ns() + _REFUSED_NS
-    while True:
-        try:
-            with told_to(trace):
-                status = stop(link, means)
-            _LOG.decided("stop acknowledged: it rests", controller=link.identity, request="stop")
-            return status
-        except (TransportError, RemoteProtocolError) as error:
-            tries_left -= 1
-            if isinstance(error, ConnectError) or not tries_left:
-                raise
-        except RejectedError as error:
-            # A PLC that is busy for a moment refuses a look. A password is never tried again.
-            by_mailbox = link.kind == "softmotion" and not isinstance(error, LoginRefusedError)
-            if not by_mailbox or runtime.monotonic_ns() >= refused_until_ns:
-                raise
-            runtime.sleep(_AGAIN_S)
+    means = StopMeans(given, timeout_s, patience_s, clock, met, runtime.random_number(32))
+    return attempted(_way_of(link.kind), link, means, trace=trace)
+
+
+def _way_of(kind: str) -> "StopWay":
+    """Return how a controller of this kind is stopped; no more is loaded than that needs."""
+    if kind == "epson":
+        from robolink.controllers.epson.rest import stop_over_new_link
+
+        return stop_over_new_link
+    if kind == "softmotion":
+        from robolink.controllers.softmotion.rest import stop_over_new_link as stop_group
+
+        return stop_group
+    return _stop_map if kind == "plc" else _stop_other
 
 
 def stop_requests(url: str) -> tuple[str, ...]:
@@ -134,104 +106,7 @@ def stop_requests(url: str) -> tuple[str, ...]:
     return ()
 
 
-class _Means(NamedTuple):
-    """The means to reach a controller; see :func:`stop_now`."""
-
-    password: str
-    timeout_s: float
-    login_s: float
-    clock: "Clock | None"
-    met: "Callable[[str], None] | None"
-    owner: int
-    """Token of all attempts in a mailbox. With a new token, an attempt would be superseded by the
-    one before, whose answer was lost and whose command is acknowledged only now."""
-
-
-def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.epson.line import EpsonConversation, open_line
-    from robolink.controllers.epson.rest import bring_to_rest
-
-    opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock)
-    talk = EpsonConversation(opened, timeout_s=means.login_s)
-    try:
-        with Concerning(talk.identity):
-            talk.login(means.password)
-            talk.timeout_s = means.timeout_s
-            now = bring_to_rest(talk.exchange, talk.clock, controller=talk.identity)
-            from robolink.controllers.epson.answers import may_log_out, status_from_flags
-
-            status = status_from_flags(*now)
-            if means.met is not None:
-                _tell_who(talk, means.met)
-            if may_log_out(status):
-                with suppress(RobolinkError):  # it has stopped: a failure here is harmless
-                    talk.exchange("Logout")
-            return status
-    finally:
-        talk.close()
-
-
-def _tell_who(talk: "EpsonConversation", met: "Callable[[str], None]") -> None:
-    """Say which controller has stopped, if this firmware reports it without an Execute."""
-    from robolink.controllers.epson.link import name_from
-
-    def asked() -> str:
-        number = talk.exchange("GetContNo").fields
-        robots = talk.exchange("GetRobotSerial", "0").fields
-        return name_from([text.strip() for text in number], [text.strip() for text in robots])
-
-    _tell_what_is_said_twice(asked, met)
-
-
-def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.softmotion.commands import CommandSender
-    from robolink.controllers.softmotion.snapshots import Snapshots
-    from robolink.controllers.softmotion.wire import MailboxWire
-    from robolink.transport import open_mailbox_link
-
-    password = None
-    if means.password:
-        from robolink.model import Secret  # here, because no other mailbox has a login
-
-        password = Secret(means.password)
-    mailbox = open_mailbox_link(
-        link, timeout_s=means.timeout_s, clock=means.clock, password=password, stopping=True
-    )
-    wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
-    try:
-        with Concerning(wire.identity):
-            now = CommandSender(wire, Snapshots(wire)).bring_to_rest()
-        from robolink.controllers.softmotion.condition import status_of
-
-        if means.met is not None:
-            _tell_which(wire, means.met)
-        return status_of(now)
-    finally:
-        wire.close()
-
-
-def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
-    """Say which PLC has stopped, if its program has a number."""
-    from robolink.controllers.softmotion.mailbox import identity_of, read_device_id
-
-    def asked() -> str:
-        device_id = read_device_id(wire)
-        return "" if device_id is None else identity_of(wire, device_id).name
-
-    _tell_what_is_said_twice(asked, met)
-
-
-def _tell_what_is_said_twice(asked: "Callable[[], str]", met: "Callable[[str], None]") -> None:
-    """Ask twice which controller has stopped: an answer that was damaged names another one.
-
-    The note of a stop that names another one holds nothing back here; one without a name does.
-    """
-    with suppress(RobolinkError):
-        if (name := asked()) and name == asked():
-            met(name)
-
-
-def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
+def _stop_other(link: LinkUrl, means: StopMeans) -> "ControllerStatus":
     """Stop a controller of a kind that another package brings, by the means that it offers."""
     from robolink.controllers.registry import ConnectionTerms, opened
     from robolink.journal import open_log, signature_here
@@ -252,7 +127,7 @@ def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
         return controller.status()
 
 
-def _stop_map(link: LinkUrl, means: _Means) -> "ControllerStatus":
+def _stop_map(link: LinkUrl, means: StopMeans) -> "ControllerStatus":
     del means
     raise RejectedError(
         tr("robolink neither moves nor stops a PLC with a map."),

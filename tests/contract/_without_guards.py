@@ -200,6 +200,13 @@ def _taken_from_anybody(seats: Any, cell: str, tablet: Any, *, moving: object) -
     return Taking()
 
 
+def _opened_in_any_case(latch: Any) -> None:
+    """Open the latch when no stop is under way, whoever stopped meanwhile."""
+    with latch._stops:
+        latch._stops.wait_for(lambda: not latch._under_way, 10.0)
+        latch._released = latch._closings
+
+
 _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.DriverLink.carry_out": _carried_out,
     "robolink.controllers.MotionGroupCore._marked": _moved_unmarked,
@@ -218,6 +225,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.softmotion.commands.CommandSender._before": (
         lambda sender, _draft: sender._snapshots.take()
     ),
+    "robolink.stop_latch.StopLatch.release": _opened_in_any_case,
     "robolink.controllers.softmotion.wire.MailboxWire._may_beat": property(
         lambda wire: wire._attends or not wire.motions.unfinished
     ),

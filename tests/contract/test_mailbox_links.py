@@ -2,12 +2,14 @@
 
 import threading
 from contextlib import ExitStack, closing
+from functools import partial
 
 import pytest
 
 from robolink.errors import (
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportClosedError,
 )
 from robolink.transport import MailboxHead, open_mailbox_link, open_modbus, told_to
@@ -224,6 +226,46 @@ def test_threads_never_get_each_others_answers(far_end, link):
     for thread in threads:
         thread.join(20)
     assert wrong == []
+
+
+def test_what_is_not_admitted_is_not_written_and_the_link_goes_on(far_end, link):
+    link.write_command(COMMAND)
+    before = far_end.command()
+
+    def stopped():
+        raise StoppedError("stopped", remedy="")
+
+    for objection in (stopped, partial(next, iter(()))):
+        with pytest.raises((StoppedError, StopIteration)):
+            link.write_command(tuple(word + 1 for word in COMMAND), objection)
+    assert far_end.command() == before
+    far_end.put_response(RESPONSE)
+    assert link.read_response() == RESPONSE
+    link.write_command(tuple(word + 2 for word in COMMAND))
+    assert far_end.command()[:62] == [word + 2 for word in COMMAND[:62]]
+
+
+def test_a_write_is_admitted_when_no_other_exchange_is_under_way(far_end):
+    """Between the last question and the wire nothing fits: not another exchange, nor a stop."""
+    asked = threading.Event()
+    writers: list[threading.Thread] = []
+
+    def traffic(_now_ns, _way, _data):
+        if writers:
+            begun.append(writers.pop())
+            begun[0].start()
+            early.append(asked.wait(0.2))
+
+    begun: list[threading.Thread] = []
+    early: list[bool] = []
+    far_end.put_response(RESPONSE)
+    with told_to(traffic), closing(open_mailbox_link(far_end.url, timeout_s=2.0)) as link:
+        write = partial(link.write_command, COMMAND, asked.set)
+        writers.append(threading.Thread(target=write))
+        link.read_response()
+        begun[0].join(20)
+    assert early == [False]
+    assert asked.is_set()
 
 
 def test_a_closed_link_says_so(link):

@@ -1,5 +1,6 @@
 """A stop: requests that its latch lets through, its note, and the stopped state on EPSON."""
 
+import inspect
 import json
 import threading
 from typing import Any
@@ -26,8 +27,10 @@ from robolink.errors import (
 )
 from robolink.files.durable import file_name, state_folder
 from robolink.journal._lease_view import LeaseHolder, LeaseView
+from robolink.protocols import spel
 from robolink.protocols.epson_text import COMMANDS, Reply, Request
 from robolink.protocols.mailbox import Command, Opcode
+from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass, StopLatch
 from robolink.stopping import clear_note, find_note, leave_note
 from robolink.timing import NS_PER_S
@@ -188,6 +191,19 @@ def test_closing_a_link_waits_for_the_stop_that_uses_it(latch):
         ("Go XY(1.000, 2.000, 3.000, 0.000) /R /0", ACT),
         ("Move XY(1.000, 2.000, 3.000, 0.000) Till Sw(1) = On", ACT),
         ("Print 1; Go P1", ACT),
+        ("Print Measure(1)", ACT),
+        ("Print Tool, Measure", ACT),
+        ("Print RobotModel", ACT),
+        ("Print Toolbox(1)", ACT),
+        ("Print XY(1, 2, 3, 4) + Measure(2)", ACT),
+        ('Print "Tool", Measure("Tool")', ACT),
+        ('Print #1, "Tool"', ACT),
+        ("Print Sw(1) : Go P1", ACT),
+        ("Print " + "P11" * 2000 + "#", ACT),
+        ('Print "Measure(1)"', LOOK),
+        ("Print PAgl(LJM(XY(300.000, 100.000, -60.000, 0.000) /R /0, Here, 2), 2)", LOOK),
+        ("Print PAgl(XY(300.000, 100.000, -60.000, 0.000) /0, 2)", LOOK),
+        ('Print "", Sw(3), TLSet(2)', LOOK),
         ("Tool 1; Go P1", ACT),
         ("Tool 1 Go P1", ACT),
         ("tool 1", ACT),
@@ -197,6 +213,24 @@ def test_closing_a_link_waits_for_the_stop_that_uses_it(latch):
 )
 def test_a_statement_is_what_its_text_says(statement, expected):
     assert command_class_of(Request("Execute", (statement,))) is expected
+
+
+def built_by_number():
+    """Return what the builders make that need nothing but numbers."""
+    for name in spel.__all__:
+        found = getattr(spel, name)
+        if not inspect.isfunction(found) or found.__annotations__.get("return") is not Statement:
+            continue
+        kinds = [one.annotation for one in inspect.signature(found).parameters.values()]
+        if all(kind is int for kind in kinds):
+            yield str(found(*(1 for _ in kinds)))
+
+
+def test_all_that_robolink_prints_is_a_look():
+    printing = [text for text in built_by_number() if text.startswith("Print ")]
+    assert len(printing) > 20
+    for text in (*printing, spel.print_several(spel.print_robot(), spel.print_output(3))):
+        assert command_class_of(Request("Execute", (text,))) is LOOK, text
 
 
 def test_every_request_that_is_not_known_to_look_or_calm_acts():
@@ -479,3 +513,79 @@ def test_a_stop_that_is_under_way_is_released_when_it_has_ended():
     person.join(PATIENCE_S)
     assert opened.is_set()
     latch.admit(CommandClass.ACT, "Move")
+
+
+def test_a_release_opens_no_stop_that_came_after_it_was_asked_for():
+    """The person pressed once more while the first stop was still under way."""
+    latch, told, waits = StopLatch("cell"), [], threading.Event()
+
+    class Room(threading.Condition):
+        """Tells that somebody is about to wait."""
+
+        def wait_for(self, predicate, timeout=None):
+            waits.set()
+            return super().wait_for(predicate, timeout)
+
+    latch._stops = Room()
+
+    def release():
+        try:
+            latch.release()
+        except StoppedError as refusal:
+            told.append(str(refusal))
+
+    with latch.stopping():
+        person = threading.Thread(target=release)
+        person.start()
+        assert waits.wait(PATIENCE_S)
+        latch.close()
+    person.join(PATIENCE_S)
+    assert "stopped once more" in told[0]
+    assert latch.closed
+    latch.release()
+    assert not latch.closed
+
+
+def test_a_release_that_was_asked_about_opens_nothing_that_came_since_the_question():
+    latch = StopLatch("cell")
+    latch.close()
+    with pytest.raises(StoppedError), latch.calming("reset"):
+        latch.close()
+        latch.release()
+    assert latch.closed
+    with latch.calming("reset"):
+        latch.release()
+    assert not latch.closed
+
+
+def test_a_closing_whose_thread_is_held_up_is_not_lost():
+    """It has its number, another thread stops and is released, and then it goes on."""
+
+    class HeldUp:
+        """Counts, and lets another thread stop and release between a number and its use."""
+
+        def __init__(self):
+            self.last = 0
+
+        def __next__(self):
+            self.last += 1
+            mine = self.last
+            if mine == 1:
+                one.close()
+                one.release()
+            return mine
+
+    one: Any = StopLatch("cell")
+    one._count = HeldUp()
+    one.close()
+    assert one.closed
+    with pytest.raises(StoppedError):
+        one.admit(ACT, "Move")
+
+
+def test_a_latch_that_was_severed_stays_closed():
+    latch = StopLatch("cell")
+    latch.sever()
+    latch.release()
+    assert latch.closed
+    assert latch.severed

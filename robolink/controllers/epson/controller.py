@@ -10,6 +10,7 @@ from robolink.controllers.epson.group import EpsonGroup
 from robolink.controllers.epson.line import EpsonLine, open_line
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.preserve import EpsonPreserver, EpsonResolver, PendingValues
+from robolink.controllers.epson.rest import stop_over_new_link
 from robolink.controllers.epson.session import (
     EpsonSession,
     alone,
@@ -23,6 +24,7 @@ from robolink.controllers.epson.tools import EpsonToolTable, PublishedTools, rea
 from robolink.controllers.epson.values import EpsonIo, EpsonVariables
 from robolink.controllers.epson.vision_looks import EpsonLooks
 from robolink.controllers.registry import ConnectionTerms
+from robolink.controllers.stop_attempts import anew
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -372,7 +374,7 @@ def _opened(url: LinkUrl, terms: ConnectionTerms, told: Callable[[OutcomeLog], N
     line = open_line(url, timeout_s=terms.timeout_s, clock=terms.clock)
     outcomes = terms.record_of(line.transport)
     told(outcomes)
-    return open_epson(
+    controller = open_epson(
         line,
         outcomes=outcomes,
         password=terms.password,
@@ -380,6 +382,8 @@ def _opened(url: LinkUrl, terms: ConnectionTerms, told: Callable[[OutcomeLog], N
         remote_timeout_s=terms.remote_timeout_s,
         acceleration_mm_s2=terms.acceleration_mm_s2,
     )
+    controller.stops_anew(anew(stop_over_new_link, url, terms))
+    return controller
 
 
 def open_epson(

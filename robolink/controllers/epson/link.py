@@ -403,6 +403,11 @@ class EpsonLink(DriverLink):
             session.identity, session.clock, session.latch, outcomes, gate=session.uninterrupted()
         )
 
+    @property
+    def session_over(self) -> bool:
+        """Whether its conversation has ended for good."""
+        return not self.session.alive
+
     def forget_robot(self) -> None:
         """Ask anew, at the next use, which robot is current, and whose record it is."""
         self.robot.forget()

@@ -99,6 +99,8 @@ class EpsonMotion:
     def abort(self) -> None:
         """Send Abort once and await the end of the movement.
 
+        Where no answer comes, and the session is over, the controller is stopped over a new link.
+
         Raises:
             OutcomeUnknownError: No end was seen; the marker stays.
         """
@@ -106,11 +108,14 @@ class EpsonMotion:
         with session.uninterrupted():
             with self._link.markers.doubt(self.statement):
                 if self._pending.answer is None:
-                    # A refusal may mean that the movement has just ended by itself; wait for its
-                    # end.
-                    with suppress(RejectedError):
-                        session.exchange("Abort")
-                    self._end_within(session.timeout_s)
+                    try:
+                        # A refusal may mean that it has just ended by itself; wait for its end.
+                        with suppress(RejectedError):
+                            session.exchange("Abort")
+                        self._end_within(session.timeout_s)
+                    except (TransportError, RemoteProtocolError):
+                        self._link.stopped_anew()
+                        raise
             self._take_answer()
 
     def _watch(self, deadline: Deadline) -> bool:

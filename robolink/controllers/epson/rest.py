@@ -12,12 +12,24 @@ imported that the first frame of a stop does not need.
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from robolink.errors import BusyError, OutcomeUnknownError, RejectedError
+from robolink.controllers.epson.line import EpsonConversation, open_line
+from robolink.controllers.stop_attempts import StopMeans, tell_what_is_said_twice
+from robolink.errors import (
+    BusyError,
+    Concerning,
+    OutcomeUnknownError,
+    RejectedError,
+    RobolinkError,
+)
 from robolink.messages import tr
 from robolink.protocols.epson_text import ErrorCode, Reply, StatusFlags, parse_status
 from robolink.timing import Clock, Deadline
+from robolink.transport import LinkUrl
+
+if TYPE_CHECKING:
+    from robolink.model import ControllerStatus
 
 REST_S: Final = 5.0
 """Longest time from the first Abort to a confirmed stop, in s (docs/reference/rules.md 5)."""
@@ -86,3 +98,47 @@ def _stop(ask: Ask) -> bool:
             raise
         return False
     return True
+
+
+def stop_over_new_link(link: LinkUrl, means: StopMeans) -> "ControllerStatus":
+    """Log in, stop, and return the state that confirms it; one attempt.
+
+    Args:
+        link: Which controller.
+        means: How it is reached.
+
+    Raises:
+        LoginRefusedError: The password is wrong.
+        LoginUnansweredError: It serves another client.
+        RobolinkError: As :func:`bring_to_rest`, and as the transport.
+    """
+    opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock)
+    talk = EpsonConversation(opened, timeout_s=means.login_s)
+    try:
+        with Concerning(talk.identity):
+            talk.login(means.password)
+            talk.timeout_s = means.timeout_s
+            now = bring_to_rest(talk.exchange, talk.clock, controller=talk.identity)
+            from robolink.controllers.epson.answers import may_log_out, status_from_flags
+
+            status = status_from_flags(*now)
+            if means.met is not None:
+                _tell_who(talk, means.met)
+            if may_log_out(status):
+                with suppress(RobolinkError):  # it has stopped: a failure here is harmless
+                    talk.exchange("Logout")
+            return status
+    finally:
+        talk.close()
+
+
+def _tell_who(talk: EpsonConversation, met: Callable[[str], None]) -> None:
+    """Say which controller has stopped, if this firmware reports it without an Execute."""
+    from robolink.controllers.epson.link import name_from
+
+    def asked() -> str:
+        number = talk.exchange("GetContNo").fields
+        robots = talk.exchange("GetRobotSerial", "0").fields
+        return name_from([text.strip() for text in number], [text.strip() for text in robots])
+
+    tell_what_is_said_twice(asked, met)

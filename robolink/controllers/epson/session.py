@@ -61,7 +61,20 @@ _SESSION: Final = frozenset({"login", "logout"})
 _SETS_BACK: Final = frozenset({"abort", "reset", "setmotorson"})
 """Requests that put power, speed and acceleration back, or may (docs/reference/spel.md 6.3)."""
 
-_LOOKS: Final = re.compile(r"(Print .*|Where|TLSet|Base|Here|RealPos)", re.ASCII)
+_SHOWN_BY_PRINT: Final = (
+    r"Accel|AccelS|Agl|Chr\$|CX|CY|CZ|CU|CV|CW|FindPos|Here|LJM|Motor|Oport|PAgl|PDef|PosFound|Power"
+    r"|RealPos|Robot|RobotModel\$|RobotSerial\$|RobotType|Speed|SpeedFactor|SpeedS|Sw|TargetOK"
+    r"|TillOn|TLDef|TLSet|Tool|XY"
+)
+"""What Print may name: functions of SPEL+ that only read. A program's own function may move, and
+Print with a # writes to a port or a file."""
+
+_LOOKS: Final = re.compile(
+    r"Print (?:\"[^\"]*+\"|[ (),.+0-9-]|/[A-Z0-9]++|P[0-9]++|(?:"
+    + _SHOWN_BY_PRINT
+    + r")(?![\w$]))*+|Where|TLSet|Base|Here|RealPos",
+    re.ASCII,
+)
 _RESTORES: Final = re.compile(
     r"(Tool [0-9]+|Power (Low|High)|(SpeedS?|AccelS) [0-9., ]+)", re.ASCII
 )

@@ -480,7 +480,9 @@ class CommandSender:
             sequence=number,
             owner=self._wire.owner,
             epoch=self._wire.epoch,
-            boot_id=before.boot_id,
+            # A PLC that has started anew since refuses what names its last start. To end what moves
+            # there is right for any.
+            boot_id=0 if draft.only_ends else before.boot_id,
         )
 
     def _encode(self, command: Command) -> Words:

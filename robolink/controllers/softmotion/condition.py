@@ -17,14 +17,21 @@ def is_moving(now: Response) -> bool:
 
 
 _STAYED: Final = 0.05
-"""Largest change of a stopped axis within a tenth of a second, in its units: drives hold a position
-within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
+"""Largest change of a stopped axis within a tenth of a second, in mm or degrees: drives hold a
+position within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
+
+_UM_PER_MM: Final = 1000.0
 
 
 def has_stayed(before: Response, now: Response) -> bool:
-    """Whether every axis is where it was; a PLC whose program does not run shows nothing."""
+    """Whether every axis is where it was; a PLC whose program does not run shows nothing.
+
+    Which axes turn is not known here, so none may change by more than the limit in degrees, nor by
+    more than that in mm: where the PLC counts metres, 0.05 of its units are a fast movement.
+    """
+    most = min(_STAYED, _STAYED * _UM_PER_MM / now.unit_um)
     return before.plc_heartbeat != now.plc_heartbeat and all(
-        abs(a - b) < _STAYED for a, b in zip(before.axes, now.axes, strict=True)
+        abs(a - b) < most for a, b in zip(before.axes, now.axes, strict=True)
     )
 
 

@@ -11,13 +11,14 @@ from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.condition import condition_of, status_of
 from robolink.controllers.softmotion.facts import MailboxFacts, set_kinematics
 from robolink.controllers.softmotion.group import SoftMotionGroup
-from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.kinematics import OrientationImages
-from robolink.controllers.softmotion.mailbox import Mailbox, read_device_id
+from robolink.controllers.softmotion.mailbox import Mailbox, SoftMotionIo, read_device_id
 from robolink.controllers.softmotion.ownership import take_command
+from robolink.controllers.softmotion.rest import stop_over_new_link
 from robolink.controllers.softmotion.snapshots import Snapshots
 from robolink.controllers.softmotion.tools import SoftMotionResolver, SoftMotionToolTable
 from robolink.controllers.softmotion.wire import MailboxWire
+from robolink.controllers.stop_attempts import anew
 from robolink.errors import Concerning, ConfigError, ControllerFaultError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import (
@@ -340,7 +341,7 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     link = open_mailbox_link(
         url, timeout_s=terms.timeout_s, clock=terms.clock, password=terms.password
     )
-    return open_softmotion(
+    controller = open_softmotion(
         link,
         outcomes=terms.record_of(link),
         timeout_s=terms.timeout_s,
@@ -348,6 +349,8 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         acceleration_mm_s2=terms.acceleration_mm_s2,
         tell=terms.tell,
     )
+    controller.stops_anew(anew(stop_over_new_link, url, terms))
+    return controller
 
 
 def _own_kinematics(url: LinkUrl) -> tuple[LinkUrl, str]:

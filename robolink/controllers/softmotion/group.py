@@ -20,9 +20,8 @@ from robolink.controllers.softmotion.condition import (
     require_tool_known,
 )
 from robolink.controllers.softmotion.facts import block_name
-from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.jog import Jog, JogWatch
-from robolink.controllers.softmotion.mailbox import Mailbox
+from robolink.controllers.softmotion.mailbox import Mailbox, SoftMotionIo
 from robolink.controllers.softmotion.movement import (
     LATCH_CYCLE_S,
     SoftMotionMotion,

@@ -16,6 +16,7 @@ from robolink.errors import (
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -149,10 +150,9 @@ class CanopenMailboxLink:
 
     def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one DOMAIN download."""
-        admit()
         data = struct.pack(f"<{COMMAND_WORDS}H", *require_words(words, COMMAND_WORDS))
         with self._exchange() as deadline:
-            self._download(COMMAND_OBJECT, 0, data, deadline)
+            self._download(COMMAND_OBJECT, 0, data, deadline, admit)
 
     def read_head(self) -> MailboxHead:
         """See :meth:`robolink.transport.MailboxLink.read_head`; waits for the next TPDO1."""
@@ -199,12 +199,12 @@ class CanopenMailboxLink:
 
     @contextmanager
     def _exchange(self) -> Iterator[Deadline]:
-        """Hold the lock and one deadline; after an error that is no refusal, close."""
+        """Hold the lock and one deadline; close after any error that is not a refusal."""
         with Concerning(self.identity), self._lock:
             try:
                 self._watch.drain()
                 yield Deadline.after(self.clock, self._timeout_s)
-            except RejectedError:
+            except (RejectedError, StoppedError):
                 raise
             except RobolinkError:
                 self._line.close()
@@ -239,8 +239,16 @@ class CanopenMailboxLink:
         place = (index, subindex)
         return SdoTransfer(self._watch, self.identity, place, deadline, strays=strays).upload()
 
-    def _download(self, index: int, subindex: int, data: bytes, deadline: Deadline) -> None:
-        SdoTransfer(self._watch, self.identity, (index, subindex), deadline).download(data)
+    def _download(
+        self,
+        index: int,
+        subindex: int,
+        data: bytes,
+        deadline: Deadline,
+        admit: Callable[[], None] = lambda: None,
+    ) -> None:
+        place = (index, subindex)
+        SdoTransfer(self._watch, self.identity, place, deadline).download(data, admit)
 
     def _no_heads(self) -> TransportTimeoutError:
         return TransportTimeoutError(

@@ -7,6 +7,7 @@ after a failure.
 
 import contextlib
 from collections import deque
+from collections.abc import Callable
 from typing import Final, Protocol
 
 from robolink.errors import (
@@ -39,6 +40,9 @@ _LAST: Final = 0x01
 
 _ABORT_TIMED_OUT: Final = 0x0504_0000
 _ABORT_UNKNOWN_SERVICE: Final = 0x0504_0001
+_ABORT_HELD_BACK: Final = 0x0800_0020
+"""Data cannot be transferred or stored to the application."""
+
 _NO_SUCH_OBJECT: Final = (0x0602_0000, 0x0609_0011)
 _LENGTH_DOES_NOT_FIT: Final = (0x0607_0010, 0x0607_0012, 0x0607_0013)
 
@@ -107,11 +111,18 @@ class SdoTransfer:
             toggle ^= _TOGGLE
         raise self._mismatched(answer)
 
-    def download(self, data: bytes) -> None:
-        """Write ``data`` to the object, once."""
+    def download(self, data: bytes, admit: Callable[[], None] = lambda: None) -> None:
+        """Write ``data`` to the object, once.
+
+        Args:
+            data: What to write.
+            admit: Asked before the frame that makes it count. If it raises, that frame is not sent,
+                and the server told to forget the others.
+        """
         if len(data) <= _EXPEDITED_BYTES:
             unused = _EXPEDITED_BYTES - len(data)
             command = _DOWNLOAD | unused << 2 | _EXPEDITED | _SIZED
+            admit()
             self._exchange(bytes([command]) + self._object + data + bytes(unused))
             return
         size = len(data).to_bytes(_EXPEDITED_BYTES, "little")
@@ -122,6 +133,12 @@ class SdoTransfer:
             unused = _SEGMENT_BYTES - len(segment)
             last = _LAST if begin + _SEGMENT_BYTES >= len(data) else 0
             command = _DOWNLOAD_SEGMENT | toggle | unused << 1 | last
+            if last:
+                try:
+                    admit()
+                except BaseException:
+                    self._abort(_ABORT_HELD_BACK)
+                    raise
             self._exchange(bytes([command]) + segment + bytes(unused))
             toggle ^= _TOGGLE
 

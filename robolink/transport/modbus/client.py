@@ -4,7 +4,7 @@ Nothing is sent twice and no connection is renewed by itself
 (docs/decisions/0004-no-silent-retry.md). Addresses count from 0, as on the wire.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 from robolink import runtime
@@ -135,16 +135,29 @@ class ModbusClient:
         return tuple(map(bool, self._read(Area.DISCRETE, address, count, unit)[:count]))
 
     def write_registers(
-        self, address: int, values: Sequence[int], *, unit: int | None = None
+        self,
+        address: int,
+        values: Sequence[int],
+        *,
+        unit: int | None = None,
+        admit: Callable[[], None] = lambda: None,
     ) -> None:
-        """Write holding registers in one request (function 16), at most 123."""
+        """Write holding registers in one request (function 16), at most 123.
+
+        Args:
+            address: Of the first.
+            values: The words.
+            unit: Asked in place of the usual one.
+            admit: Asked when nothing else is under way on the link. If it raises, nothing is
+                written, and the link stays: it has to carry a stop.
+        """
         if values and not (min(values) >= 0 and max(values) <= 0xFFFF):
             raise ConfigError(
                 tr("A register holds 0 to 65535."),
                 remedy=tr("Check the values; a negative number is sent plus 65536."),
                 controller=self.identity,
             )
-        self._write(WRITE_REGISTERS, Area.HOLDING, address, tuple(values), unit)
+        self._write(WRITE_REGISTERS, Area.HOLDING, address, tuple(values), unit, admit)
 
     def write_coil(self, address: int, value: bool, *, unit: int | None = None) -> None:
         """Write one coil (function 5)."""
@@ -161,10 +174,17 @@ class ModbusClient:
         return self._ask(request).values
 
     def _write(
-        self, function: int, area: Area, address: int, values: tuple[int, ...], unit: int | None
+        self,
+        function: int,
+        area: Area,
+        address: int,
+        values: tuple[int, ...],
+        unit: int | None,
+        admit: Callable[[], None] = lambda: None,
     ) -> None:
         self._require_range(area, address, len(values), MOST_REGISTERS_WRITTEN)
-        self._ask(ModbusRequest(self._asked(unit), function, area, address, len(values), values))
+        request = ModbusRequest(self._asked(unit), function, area, address, len(values), values)
+        self._ask(request, admit)
 
     def _asked(self, unit: int | None) -> int:
         asked = self._unit if unit is None else unit
@@ -193,8 +213,9 @@ class ModbusClient:
             controller=self.identity,
         )
 
-    def _ask(self, request: ModbusRequest) -> ModbusReply:
+    def _ask(self, request: ModbusRequest, admit: Callable[[], None] = lambda: None) -> ModbusReply:
         with self._lock:
+            admit()
             deadline = self._deadline()
             try:
                 reply = self._exchange.ask(request, deadline)

@@ -126,8 +126,8 @@ class ModbusMailboxLink:
 
     def write_command(self, words: Sequence[int], admit: Callable[[], None] = lambda: None) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one function 16."""
-        admit()
-        self._client.write_registers(self._places.command, require_words(words, COMMAND_WORDS))
+        command = require_words(words, COMMAND_WORDS)
+        self._client.write_registers(self._places.command, command, admit=admit)
 
     def read_head(self) -> MailboxHead:
         """See :meth:`robolink.transport.MailboxLink.read_head`; ten registers."""

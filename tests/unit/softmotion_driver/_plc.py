@@ -231,6 +231,8 @@ class Plc:
     def _carry_out(self, command: Command) -> tuple[CommandState, int]:
         opcode = Opcode(command.opcode)
         error = command.refusal() or self.refusals.get(opcode, 0) or self.refuses(command)
+        if not error and command.boot_id not in (0, self.now.boot_id):
+            error = ErrorClass.OTHER_BOOT
         if not error and command.needs_owner and command.owner != self.owner:
             error = ErrorClass.NOT_OWNER
         elif not error and command.needs_owner and command.epoch != self.epoch:

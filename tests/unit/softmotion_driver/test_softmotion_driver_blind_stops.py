@@ -416,11 +416,23 @@ def test_a_far_end_that_showed_no_mailbox_is_told_nothing(cell):
     assert cell.link.sent == []
 
 
-def test_a_plc_that_has_started_anew_takes_no_stop_of_before(cell, plc, controller):
-    """Its group is disabled and nobody owns it; the block names the start that was met."""
-    met = plc.now.boot_id
+def test_a_stop_stops_what_moves_on_a_plc_that_has_started_anew(cell, plc, controller):
+    """Its last start is not named; another client may move it by now."""
     plc.restart()
-    plc.refuses = lambda command: 0 if command.boot_id == plc.now.boot_id else ErrorClass.OTHER_BOOT
     with pytest.raises(TransportBrokenError, match="restarted"):
         controller.stop()
-    assert [command.boot_id for command in plc.executed] == [met]
+    assert plc.opcodes() == [Opcode.STOP]
+    assert plc.now.group_state == GroupState.STOPPING
+    assert plc.now.error_class == 0
+
+
+def test_what_acts_names_the_start_that_was_met(cell, plc, controller):
+    """Whatever a PLC does that has started anew since, no command of before moves it."""
+    met = plc.now.boot_id
+    cell.link.before("write_command", plc.restart)
+    with pytest.raises((TransportBrokenError, RejectedError, OutcomeUnknownError)):
+        controller.groups[0].move_to(
+            replace(controller.groups[0].pose(), z_mm=290.0), SLOW, box=ANYWHERE
+        )
+    assert decode_command(cell.link.sent[-1]).boot_id == met
+    assert plc.now.error_class == ErrorClass.OTHER_BOOT

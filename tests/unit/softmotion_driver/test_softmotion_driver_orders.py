@@ -6,6 +6,7 @@ from itertools import count
 import pytest
 
 from robolink.controllers.softmotion import answers
+from robolink.controllers.softmotion.condition import has_stayed
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import (
     ConfigError,
@@ -287,6 +288,24 @@ def test_a_group_whose_axes_go_on_after_its_stop_was_not_stopped(cell, plc, cont
     with pytest.raises(OutcomeUnknownError, match="could not confirm") as unconfirmed:
         controller.stop()
     assert "press the emergency stop" in unconfirmed.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("unit_um", "a_look", "rests"),
+    [
+        (1000.0, 0.3, False),
+        (1000.0, 0.001, True),
+        (1e6, 0.03, False),  # of metres: 0.3 m/s
+        (1e6, 1e-6, True),
+        (1.0, 0.3, False),
+        (1.0, 0.01, True),
+    ],
+)
+def test_an_axis_stands_by_the_unit_in_which_the_plc_counts(plc, unit_um, a_look, rests):
+    before = replace(plc.now, unit_um=unit_um, plc_heartbeat=1)
+    now = replace(before, axes=(a_look, *before.axes[1:]), plc_heartbeat=2)
+    assert has_stayed(before, now) is rests
+    assert not has_stayed(before, replace(before, axes=before.axes))
 
 
 def test_a_stop_that_is_not_confirmed_names_the_emergency_stop(plc, controller):

@@ -143,7 +143,7 @@ def keep(found, told):
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_fits_every_terminal(name, language, monkeypatch):
     found: list[Any] = []
-    monkeypatch.setattr(render, "drawn_table", lambda *told: keep(found, told))
+    monkeypatch.setattr(render, "text_table", lambda *told: keep(found, told))
     TABLES[name]()
     assert found
     for title, heads, rows, _ in found:

@@ -6,14 +6,25 @@ it over, and it is printed once, when the command has ended well; an error print
 document instead.
 """
 
+import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, TextIO
 
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.output import beside, drawn_elsewhere, hand_over, sentences, show, visible
-from robolink_cli.console.tables import SCREEN, drawn_table
+from robolink_cli.console.output import (
+    beside,
+    draw,
+    drawn_elsewhere,
+    hand_over,
+    sentences,
+    show,
+    visible,
+)
+from robolink_cli.console.person import is_terminal
+from robolink_cli.console.tables import SCREEN, drawn_table, text_table
 
 if TYPE_CHECKING:
     from robolink.methods import NextStep
@@ -21,6 +32,9 @@ if TYPE_CHECKING:
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"
 _LOG = "robolink.log"
+
+_FAR: Final = 1000
+"""Columns of a file, whose lines are not folded at the width that is assumed of a terminal."""
 
 
 def json_is_on() -> bool:
@@ -71,24 +85,38 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) 
 
     One that is too wide for the terminal is turned (:mod:`robolink_cli.console.tables`).
     """
+    title, heads = visible(title), [visible(column) for column in columns]
+    cells = [[visible(str(cell)) for cell in row] for row in rows]
+    separate, elsewhere = json_is_on(), drawn_elsewhere()
+    if not elsewhere and _takes_text_alone(sys.stderr if separate else sys.stdout):
+        text = text_table(title, heads, cells, _FAR)
+        if text is not None:
+            draw(text, beside=separate)
+            return
     from rich.console import Console
     from rich.text import Text
 
-    cells = [[visible(str(cell)) for cell in row] for row in rows]
-    heads = [visible(column) for column in columns]
-    console = Console(stderr=json_is_on(), highlight=False, no_color=drawn_elsewhere() or None)
-    if drawn_elsewhere():
+    colours: Literal["auto"] | None = None if elsewhere else "auto"  # they would be escaped there
+    console = Console(stderr=separate, highlight=False, color_system=colours)
+    if elsewhere:
         console.width = min(console.width, SCREEN)  # a drawn screen is no wider
     elif not console.is_terminal:
-        console.width = 1000  # do not wrap at an assumed width of 80
-    drawn = drawn_table(visible(title), heads, cells, console.width)
+        console.width = _FAR
+    drawn = drawn_table(title, heads, cells, console.width)
     shown = Text(drawn) if isinstance(drawn, str) else drawn
-    if drawn_elsewhere():
+    if elsewhere:
         with console.capture() as captured:
             console.print(shown, crop=False)
         say(captured.get().rstrip("\n"))
         return
     console.print(shown, crop=False)
+
+
+def _takes_text_alone(stream: TextIO) -> bool:
+    """Return whether rich would print no colours there, and lines as lines."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    wants = any(map(os.environ.get, ("FORCE_COLOR", "TTY_COMPATIBLE")))
+    return not wants and not is_terminal(stream) and encoding.lower().startswith("utf")
 
 
 def emit(kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:

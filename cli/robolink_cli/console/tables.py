@@ -1,11 +1,13 @@
 """A table that fits: numbers whole, words folded between words, and turned if too wide.
 
 rich makes columns narrower until a table fits, and cuts numbers and words for it. So how wide each
-is gets decided here; rich draws.
+is gets decided here. rich draws it where there are colours; a table of text alone is put together
+here, because importing rich takes longer than many a command that shows a table.
 """
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -77,9 +79,12 @@ def cut(text: str, width: int) -> str:
 
 
 def pieces(row: str, width: int) -> Iterator[str]:
-    """Yield the pieces of a row that is one long word, such as a path: nothing is lost."""
-    while columns(row) > width:
-        piece = cut(row, width)
+    """Yield the pieces of a row that is one long word, such as a path: nothing is lost.
+
+    A piece has one character at least, even where that is wider than ``width``.
+    """
+    while len(row) > 1 and columns(row) > width:
+        piece = cut(row, width) or row[0]
         yield piece
         row = row[len(piece) :]
     yield row
@@ -109,6 +114,10 @@ anywhere, so that no column becomes as wide as they are.
 """
 
 
+_WIDEST: Final = 2
+"""Columns of the widest character."""
+
+
 def drawn_table(title: str, heads: Row, rows: Sequence[Row], width: int) -> "Table | str":
     """Return a table of at most ``width`` columns, or its cells below each other.
 
@@ -121,17 +130,78 @@ def drawn_table(title: str, heads: Row, rows: Sequence[Row], width: int) -> "Tab
         rows: Each as long as ``heads``.
         width: How many columns the console has.
     """
+    fitting = _fitting(heads, rows, width)
+    if fitting is None:
+        return "\n".join(_lines(title, heads, rows, width))
+    return _table(title, *fitting)
+
+
+def text_table(title: str, heads: Row, rows: Sequence[Row], width: int) -> str | None:
+    """Return :func:`drawn_table` as rich prints it where nothing is coloured.
+
+    Args:
+        title: Stands above it.
+        heads: Of its columns.
+        rows: Each as long as ``heads``.
+        width: How many columns the console has.
+
+    Returns:
+        Its lines, or ``None`` if rich has to fold the title.
+
+    Example:
+        >>> from robolink_cli.console.tables import text_table
+        >>> text_table("tools", ["tool"], [["1"]], 40).split()
+        ['tools', 'tool', '──────', '1']
+    """
+    fitting = _fitting(heads, rows, width)
+    across = width if fitting is None else 1 + sum(one + _BESIDE for one in fitting[2])
+    if "\n" in title or columns(title) > across:
+        return None
+    if fitting is None:
+        return "\n".join(_lines(title, heads, rows, width))
+    heads, rows, widths = fitting
+    figures = _figures(heads, rows)
+    cells = [
+        [_folded(cell, one).split("\n") for cell, one in zip(row, widths, strict=True)]
+        for row in (heads, *rows)
+    ]
+    deepest = max(map(len, cells[0]))
+    cells[0] = [[""] * (deepest - len(cell)) + cell for cell in cells[0]]
+    head, *under = (_rows(row, widths, figures) for row in cells)
+    edge = " " * across
+    above = [padded(title, across)] if title else []
+    rule = " " + "\u2500" * (across - 2) + " "
+    return "\n".join([*above, edge, *head, rule, *chain.from_iterable(under), edge])
+
+
+def _rows(cells: Sequence[Row], widths: Sequence[int], figures: Sequence[bool]) -> list[str]:
+    """Return the lines of one row of a table, whose cells are lines of their own."""
+    return [
+        f"  {'   '.join(map(_justified, line, widths, figures))}  "
+        for line in zip_longest(*cells, fillvalue="")
+    ]
+
+
+def _justified(line: str, width: int, right: bool) -> str:
+    """Return a line of a cell with blanks before or behind it, as rich justifies."""
+    return " " * (width - columns(line.rstrip())) + line.rstrip() if right else padded(line, width)
+
+
+def _fitting(
+    heads: Row, rows: Sequence[Row], width: int
+) -> tuple[Row, Sequence[Row], list[int]] | None:
+    """Return the heads, rows and widths of a table that fits, turned where it must be."""
     widths = column_widths(heads, rows, width)
     if widths is None and len(rows) > 1:
         turned = [*zip(heads, *rows, strict=True)]
         widths = column_widths(turned[0], turned[1:], width)
-        if widths is not None:
-            heads, rows = turned[0], turned[1:]
-    return (
-        "\n".join(_lines(title, heads, rows, width))
-        if widths is None
-        else _table(title, heads, rows, widths)
-    )
+        heads, rows = turned[0], turned[1:]
+    return None if widths is None else (heads, rows, widths)
+
+
+def _figures(heads: Row, rows: Sequence[Row]) -> list[bool]:
+    """Return which columns are numbers, and stand to the right."""
+    return [is_figures([row[index] for row in rows]) for index in range(len(heads))]
 
 
 def column_widths(heads: Row, rows: Sequence[Row], width: int) -> list[int] | None:
@@ -189,8 +259,7 @@ def _table(title: str, heads: Row, rows: Sequence[Row], widths: Sequence[int]) -
     from rich.text import Text
 
     shown = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD)
-    figures = [is_figures([row[index] for row in rows]) for index in range(len(heads))]
-    for head, width, right in zip(heads, widths, figures, strict=True):
+    for head, width, right in zip(heads, widths, _figures(heads, rows), strict=True):
         shown.add_column(
             Text(_folded(head, width)), width=width, justify="right" if right else "left"
         )
@@ -214,6 +283,9 @@ def _lines(title: str, heads: Row, rows: Sequence[Row], width: int) -> list[str]
         lines.append("")
         for head, cell in zip(heads, row, strict=True):
             told = f"  {padded(head, name)}" if head else "  "
+            if width - columns(told) < _WIDEST:  # a head that leaves no room stands above its cell
+                lines += [f"  {line}" for line in _folded(head, width - 2).split("\n")]
+                told = "  "
             first, *more = _folded(cell, width - columns(told)).split("\n")
             lines += [(told + first).rstrip(), *(" " * columns(told) + line for line in more)]
     return [*lines, ""]

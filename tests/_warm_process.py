@@ -50,6 +50,24 @@ NAME: Final = "warm-process"
 """The name of such a copy in ``/proc/PID/comm``: it is no process of the panel."""
 _READ_LATER: Final = ("PYTHONPATH", "PYTHONIOENCODING", "PYTHON_KEYRING_BACKEND")
 """Variables that a forked command obeys too."""
+_PACKAGES: Final = (
+    "robolink_cli",
+    "robolink_simulators.epson",
+    "robolink_simulators.softmotion",
+    "robolink.controllers",
+    "robolink.journal",
+)
+"""Their modules are all imported."""
+_LOADED_LATE: Final = (
+    "robolink.fleet.agent",
+    "platformdirs",
+    "rich.table",
+    "encodings.idna",
+    "uvicorn.lifespan.on",
+    "uvicorn.protocols.http.auto",
+    "uvicorn.protocols.websockets.auto",
+)
+"""What commands import only when they need it, and most that tests start do."""
 _FREE_FROM: Final = 200
 """Descriptors from here on are nobody's in a process that was just forked."""
 _started: dict[int, "_WarmProcess"] = {}
@@ -208,14 +226,15 @@ def _serve(requests: socket.socket) -> None:
 
 def import_all() -> None:
     """Import what commands and simulators use, and read the grammar of SPEL+."""
-    for name in ("robolink_cli", "robolink_simulators.epson", "robolink_simulators.softmotion"):
+    for name in _PACKAGES:
         package = import_module(name)
         for module in pkgutil.walk_packages(package.__path__, f"{name}."):
             if not module.name.endswith("__main__"):
                 with suppress(ImportError):  # of another system
                     import_module(module.name)
-    with suppress(ImportError):  # without the extra
-        import_module("robolink.fleet.agent")
+    for late in _LOADED_LATE:
+        with suppress(ImportError):  # without the extra
+            import_module(late)
     from robolink_simulators.epson.spel.parser import parse
 
     parse("Motor On")  # its grammar is read once

@@ -107,6 +107,22 @@ def test_a_command_that_is_started_is_a_child_of_this_process_with_all_imported(
     assert max(map(len, told.splitlines())) <= 50
 
 
+LOADED_BY_MOST = (
+    "robolink.controllers.epson.controller",
+    "robolink.journal.store.store",
+    "platformdirs",
+    "rich.table",
+    "uvicorn.protocols.http.auto",
+)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forked only there")
+def test_what_most_commands_load_late_is_loaded_in_a_command_that_is_started():
+    text = "import sys; print(*(name for name in sys.argv[1:] if name not in sys.modules))"
+    command = [sys.executable, "-m", "tests._program", text, *LOADED_BY_MOST]
+    assert subprocess.run(command, capture_output=True, check=True).stdout == b"\n"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_a_folder_that_a_command_added_keeps_no_later_one_from_being_forked(tmp_path, request):
     def forked():

@@ -21,6 +21,7 @@ from typing import Any
 
 import pytest
 
+from tests._room import with_room
 from tests._warm_process import import_all
 
 _NUMBER = struct.Struct("H")
@@ -117,7 +118,7 @@ def _start(
     try:
         reading.close()
         sender = _prepare(session.config, writing, number)
-        _run(session, modules, queue)
+        with_room(lambda: _run(session, modules, queue))
         sender.send()
         writing.send_bytes(b"")
     except (BrokenPipeError, KeyboardInterrupt):

@@ -238,7 +238,7 @@ class ControllerCore(DriverPart, ABC):
             if self._closed or not self._driver.stopped_anew():
                 raise
 
-    def stops_anew(self, stop: Callable[[], object]) -> None:
+    def stops_anew(self, stop: Callable[[], ControllerStatus]) -> None:
         """Let a stop whose session is over go out over a new link.
 
         Args:

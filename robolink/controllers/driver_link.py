@@ -42,7 +42,15 @@ from robolink.errors import (
     UnclearAnswerError,
 )
 from robolink.messages import in_english, joined, tr
-from robolink.model import ChangeGuard, EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
+from robolink.model import (
+    ChangeGuard,
+    ControllerStatus,
+    EntryKind,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    OutcomeLog,
+)
 from robolink.package_log import PackageLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
@@ -200,7 +208,7 @@ class DriverLink:
         self.markers = MarkerStore(identity, outcomes, latch, simulated=lambda: self.simulated)
         self.change_guard = ChangeGuard(outcomes, latch)
         self.lock = ProcedureLock(identity, latch, outcomes)
-        self.stop_anew: Callable[[], object] | None = None
+        self.stop_anew: Callable[[], ControllerStatus] | None = None
         self._gate = gate
         self._anew = runtime.lock()
         self._waiting: list[None] = []
@@ -223,7 +231,7 @@ class DriverLink:
             return False
         self.decided("the session is over; stopped over a new link", "Stop")
         with self._anew:  # one after another: a controller may answer one login only
-            self.stop_anew()
+            self.markers.ledger.saw_status(self.stop_anew(), self.clock.now_ns())
         return True
 
     @property

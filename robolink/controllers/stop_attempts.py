@@ -6,7 +6,7 @@ that the first frame of a stop does not need.
 
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 from robolink import runtime
 from robolink.errors import (
@@ -30,6 +30,17 @@ if TYPE_CHECKING:
 
     StopWay = Callable[[LinkUrl, "StopMeans"], ControllerStatus]
     """Stops the controller at a URL over a new link, once."""
+
+
+class Stoppable(Protocol):
+    """What a stop needs of a controller that is open."""
+
+    def stop(self) -> None:
+        """Stop it; any thread may call this."""
+
+    def status(self) -> "ControllerStatus":
+        """Read its state."""
+
 
 _LOG: Final = PackageLog(__package__)
 
@@ -91,7 +102,9 @@ def attempted(
             runtime.sleep(_AGAIN_S)
 
 
-def anew(stop: "StopWay", link: LinkUrl, terms: "ConnectionTerms") -> "Callable[[], object]":
+def anew(
+    stop: "StopWay", link: LinkUrl, terms: "ConnectionTerms"
+) -> "Callable[[], ControllerStatus]":
     """Return what stops a controller whose session is over, on the terms of that session.
 
     Args:

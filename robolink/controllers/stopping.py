@@ -9,8 +9,8 @@ only.
 from typing import TYPE_CHECKING
 
 from robolink import runtime
-from robolink.controllers.stop_attempts import StopMeans, attempted
-from robolink.errors import RejectedError
+from robolink.controllers.stop_attempts import StopMeans, Stoppable, attempted
+from robolink.errors import RejectedError, TransportClosedError
 from robolink.messages import tr
 from robolink.transport import LinkUrl, parse_url
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robolink.controllers.stop_attempts import StopWay
-    from robolink.model import Controller, ControllerStatus, Secret
+    from robolink.model import ControllerStatus, Secret
     from robolink.timing import Clock
     from robolink.transport import TraceSink
 
 
 def stop_now(
-    url: "str | LinkUrl | Controller",
+    url: str | LinkUrl | Stoppable,
     *,
     password: "str | Secret | None" = None,
     timeout_s: float = 3.0,
@@ -64,13 +64,29 @@ def stop_now(
         'ready'
     """
     if not isinstance(url, (str, LinkUrl)):
-        url.stop()
-        return url.status()
+        return _stopped(url)
     link = parse_url(url) if isinstance(url, str) else url
     given = password if isinstance(password, str) else password.reveal() if password else ""
     patience_s = timeout_s if login_s is None else min(login_s, timeout_s)
     means = StopMeans(given, timeout_s, patience_s, clock, met, runtime.random_number(32))
     return attempted(_way_of(link.kind), link, means, trace=trace)
+
+
+def _stopped(controller: Stoppable) -> "ControllerStatus":
+    """Stop a controller that is open, and return the state that confirms it.
+
+    Where its session was over, the stop went out over a new link, and what that showed was noted.
+    """
+    ledger = getattr(controller, "ledger", None)
+    before = ledger and ledger.seen
+    controller.stop()
+    try:
+        return controller.status()
+    except TransportClosedError:
+        seen: tuple[ControllerStatus, int] | None = ledger and ledger.seen
+        if seen is None or seen is before:
+            raise
+        return seen[0]
 
 
 def _way_of(kind: str) -> "StopWay":

@@ -25,6 +25,8 @@ from pathlib import Path
 from typing import Final, Protocol, Self
 
 from robolink import runtime
+from robolink.controllers import stop_now
+from robolink.controllers.stop_attempts import Stoppable
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
 from robolink.interrupts import ClosedAtExit
@@ -49,16 +51,6 @@ _LONGEST_PATH: Final = 100
 
 Answer = Callable[[socket.socket, dict[str, object]], None]
 """Answers a caller that has the token."""
-
-
-class Stoppable(Protocol):
-    """What the listener needs of a controller."""
-
-    def stop(self) -> None:
-        """Stop it; any thread may call this."""
-
-    def status(self) -> ControllerStatus:
-        """Read its state."""
 
 
 class Seen(Protocol):
@@ -287,8 +279,7 @@ def _stopped(
     """Stop a controller, and tell the caller how that ended."""
     _tell(caller, {"taken": True})
     try:
-        controller.stop()
-        _tell(caller, {"state": str(controller.status().state)})
+        _tell(caller, {"state": str(stop_now(controller).state)})
     except RobolinkError as error:
         _tell(
             caller,

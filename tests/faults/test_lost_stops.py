@@ -130,7 +130,7 @@ def test_f76_a_stop_goes_out_over_a_new_link_where_the_session_is_over(media, lo
             with pytest.raises(RobolinkError):
                 controller.status()
             assert arm.moving
-        controller.stop()
+        assert stop_now(controller).state is ControllerState.READY
         assert not arm.moving
         assert controller.latch.closed
         with pytest.raises(RobolinkError):

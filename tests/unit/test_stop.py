@@ -2,10 +2,15 @@
 
 import inspect
 import json
+import sys
 import threading
+from contextlib import suppress
+from itertools import count
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.checkpoints import Checkpoint, checkpoint, observed
@@ -27,10 +32,10 @@ from robolink.errors import (
 )
 from robolink.files.durable import file_name, state_folder
 from robolink.journal._lease_view import LeaseHolder, LeaseView
+from robolink.model import Elbow, Hand, Pose, Posture, Wrist
 from robolink.protocols import spel
 from robolink.protocols.epson_text import COMMANDS, Reply, Request
 from robolink.protocols.mailbox import Command, Opcode
-from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass, StopLatch
 from robolink.stopping import clear_note, find_note, leave_note
 from robolink.timing import NS_PER_S
@@ -215,22 +220,65 @@ def test_a_statement_is_what_its_text_says(statement, expected):
     assert command_class_of(Request("Execute", (statement,))) is expected
 
 
-def built_by_number():
-    """Return what the builders make that need nothing but numbers."""
-    for name in spel.__all__:
-        found = getattr(spel, name)
-        if not inspect.isfunction(found) or found.__annotations__.get("return") is not Statement:
-            continue
-        kinds = [one.annotation for one in inspect.signature(found).parameters.values()]
-        if all(kind is int for kind in kinds):
-            yield str(found(*(1 for _ in kinds)))
+POSES = st.builds(
+    Pose,
+    *[st.floats(-1e4, 1e4, allow_nan=False)] * 4,
+    hand=st.sampled_from([None, *Hand]),
+    posture=st.none()
+    | st.builds(
+        Posture,
+        st.sampled_from(Elbow),
+        st.sampled_from(Wrist),
+        **dict.fromkeys(("j1_flag", "j4_flag", "j6_flag"), st.integers(-1, 1)),
+        j1_angle_deg=st.none() | st.floats(-180, 180),
+    ),
+)
+TAKEN = {
+    "target": POSES,
+    "six_axes": st.booleans(),
+    "number": st.integers(0, 999),
+    "tool": st.integers(1, 15),
+    "bit": st.integers(0, 0xFFFF),
+    "joint": st.integers(1, 6),
+    "index": st.integers(1, 3),
+}
+BUILDERS = [name for name in spel.__all__ if name.startswith("print_") and name != "print_several"]
+PRINTED = st.sampled_from(BUILDERS).flatmap(
+    lambda name: st.builds(
+        getattr(spel, name),
+        **{taken: TAKEN[taken] for taken in inspect.signature(getattr(spel, name)).parameters},
+    )
+)
 
 
-def test_all_that_robolink_prints_is_a_look():
-    printing = [text for text in built_by_number() if text.startswith("Print ")]
-    assert len(printing) > 20
-    for text in (*printing, spel.print_several(spel.print_robot(), spel.print_output(3))):
-        assert command_class_of(Request("Execute", (text,))) is LOOK, text
+def executed(statement):
+    """Return what the statement of an Execute does."""
+    return command_class_of(Request("Execute", (statement,)))
+
+
+@pytest.mark.parametrize("name", BUILDERS)
+@given(data=st.data())
+@settings(max_examples=10)
+def test_each_print_of_robolink_looks(name, data):
+    taken = inspect.signature(getattr(spel, name)).parameters
+    statement = getattr(spel, name)(**{each: data.draw(TAKEN[each]) for each in taken})
+    assert executed(statement) is LOOK
+
+
+@given(st.lists(PRINTED, min_size=1, max_size=4))
+@settings(max_examples=50)
+def test_a_list_of_them_looks(queries):
+    assert executed(spel.print_several(*queries)) is LOOK
+
+
+@given(
+    PRINTED,
+    st.from_regex(r"(My|[a-z_])[A-Za-z0-9_]{0,12}[$]?(\([0-9, ]{0,9}\))?", fullmatch=True),
+    st.sampled_from(("Print {0}", "Print {2}, {0}", "{1}, {0}", "{1} + {0}", "Print ({2}) {0}")),
+)
+def test_a_print_that_calls_a_function_of_the_project_acts(printed, own, form):
+    statement = form.format(own, printed, printed.removeprefix("Print "))
+    assert executed(statement) is ACT
 
 
 def test_every_request_that_is_not_known_to_look_or_calm_acts():
@@ -558,29 +606,68 @@ def test_a_release_that_was_asked_about_opens_nothing_that_came_since_the_questi
     assert not latch.closed
 
 
-def test_a_closing_whose_thread_is_held_up_is_not_lost():
-    """It has its number, another thread stops and is released, and then it goes on."""
+def interrupted(call, at, act):
+    """Call a method with ``act`` before its instruction number ``at``, from 0, if it has one.
 
-    class HeldUp:
-        """Counts, and lets another thread stop and release between a number and its use."""
+    Return whether it has. That is where another thread, or a signal handler, may come in.
+    """
+    begun = 0
 
-        def __init__(self):
-            self.last = 0
+    def step(frame, event, _value):
+        nonlocal begun
+        frame.f_trace_opcodes = True
+        if event == "opcode":
+            begun += 1
+            if begun == at + 1:
+                act()
+        return step
 
-        def __next__(self):
-            self.last += 1
-            mine = self.last
-            if mine == 1:
-                one.close()
-                one.release()
-            return mine
+    def enter(frame, _event, _value):
+        if frame.f_code is not call.__func__.__code__:
+            return None
+        frame.f_trace_opcodes = True
+        return step
 
-    one: Any = StopLatch("cell")
-    one._count = HeldUp()
-    one.close()
-    assert one.closed
-    with pytest.raises(StoppedError):
-        one.admit(ACT, "Move")
+    before = sys.gettrace()
+    sys.settrace(enter)
+    try:
+        with suppress(StoppedError):
+            call()
+    finally:
+        sys.settrace(before)
+    return begun > at
+
+
+def test_a_stop_at_any_instruction_of_a_release_stays():
+    closed = []
+    for at in count():
+        latch = StopLatch("robot")
+        latch.close()
+        if not interrupted(latch.release, at, latch.close):
+            break
+        closed.append(latch.closed)
+    assert len(closed) > 20
+    # Only a stop of before its first look is one of those that are released.
+    assert closed == sorted(closed)
+    assert closed[len(closed) // 4]
+
+
+def test_a_stop_is_not_lost_to_another_one_and_its_release_at_any_instruction():
+    places = 0
+    for at in count():
+        latch, before = StopLatch("robot"), list[int]()
+
+        def another(latch=latch, before=before):
+            before.append(latch.closings)
+            latch.close()
+            latch.release()
+
+        if not interrupted(latch.close, at, another):
+            break
+        if before == [0]:  # else this stop came first, and is released with the other one
+            assert latch.closed
+            places += 1
+    assert places > 1
 
 
 def test_a_latch_that_was_severed_stays_closed():

@@ -1,5 +1,6 @@
 """A stop whose answers are lost is tried again, and never reported as done unseen (row F76)."""
 
+import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -169,12 +170,26 @@ def test_f76_two_stops_at_once_go_out_over_new_links_one_after_the_other():
 
 @pytest.mark.fault("F76")
 @pytest.mark.parametrize("how", [FaultAction.DROP_REQUEST, FaultAction.DISCONNECT_BEFORE])
-def test_f76_a_movement_that_is_given_up_is_stopped_although_its_abort_got_lost(how):
+def test_f76_ctrl_c_stops_the_robot_although_its_abort_got_lost(how):
     with creeping_robot_of_this_session() as (simulator, motion):
         simulator.faults.add(Fault(how, match="$Abort"))
+        ctrl_c = threading.Timer(0.3, signal.raise_signal, (signal.SIGINT,))
+        ctrl_c.start()
+        with pytest.raises((OutcomeUnknownError, KeyboardInterrupt)):
+            motion.wait(timeout_s=60)
+        ctrl_c.join()
+        assert not simulator.machine.arm.moving
+        assert not simulator.faults.pending
+
+
+@pytest.mark.fault("F76")
+def test_f76_what_only_takes_too_long_is_left_alone_where_its_abort_got_lost():
+    """Nobody is there who wants it: the robot goes on to its target, and that is not known."""
+    with creeping_robot_of_this_session() as (simulator, motion):
+        simulator.faults.add(Fault(FaultAction.DISCONNECT_BEFORE, match="$Abort"))
         with pytest.raises(OutcomeUnknownError):
             motion.wait(timeout_s=0.5)
-        assert not simulator.machine.arm.moving
+        assert simulator.machine.arm.moving
 
 
 @pytest.mark.fault("F76")

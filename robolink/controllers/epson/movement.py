@@ -35,8 +35,7 @@ from robolink.protocols.epson_text import ErrorCode, Refusal
 from robolink.timing import Deadline
 
 WATCH_S: Final = 0.4
-"""Interval between two looks at the flags while the robot moves, in s: emergency stop, guard and
-fault show within half a second. The end shows by itself, as the answer of the movement."""
+"""Interval between looks at emergency stop, guard and fault, in s; the end shows by itself."""
 
 _END_POLL_S: Final = 0.1
 
@@ -89,7 +88,7 @@ class EpsonMotion:
                     # Flags that cannot be read leave the movement unwatched, not its end in doubt.
                     unread, arrived = error, False
         except KeyboardInterrupt:
-            self.abort()
+            self._abort(anew=True)
             raise
         if not arrived:
             self.abort()
@@ -99,23 +98,24 @@ class EpsonMotion:
     def abort(self) -> None:
         """Send Abort once and await the end of the movement.
 
-        Where no answer comes, and the session is over, the controller is stopped over a new link.
-
         Raises:
             OutcomeUnknownError: No end was seen; the marker stays.
         """
+        self._abort()
+
+    def _abort(self, *, anew: bool = False) -> None:
+        """Abort it, ``anew`` over a new link where the session is lost: a person wants it."""
         session = self._link.session
         with session.uninterrupted():
             with self._link.markers.doubt(self.statement):
                 if self._pending.answer is None:
                     try:
-                        # A refusal may mean that it has just ended by itself; wait for its end.
-                        with suppress(RejectedError):
+                        with suppress(RejectedError):  # it has just ended by itself: wait for that
                             session.exchange("Abort")
                         self._end_within(session.timeout_s)
-                    except (TransportError, RemoteProtocolError):
-                        self._link.stopped_anew()
-                        raise
+                    finally:
+                        if anew:
+                            self._link.stopped_anew()
             self._take_answer()
 
     def _watch(self, deadline: Deadline) -> bool:

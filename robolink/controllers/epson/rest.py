@@ -14,7 +14,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
-from robolink.controllers.epson.line import EpsonConversation, open_line
 from robolink.controllers.stop_attempts import StopMeans, tell_what_is_said_twice
 from robolink.errors import (
     BusyError,
@@ -29,6 +28,7 @@ from robolink.timing import Clock, Deadline
 from robolink.transport import LinkUrl
 
 if TYPE_CHECKING:
+    from robolink.controllers.epson.line import EpsonConversation
     from robolink.model import ControllerStatus
 
 REST_S: Final = 5.0
@@ -112,6 +112,8 @@ def stop_over_new_link(link: LinkUrl, means: StopMeans) -> "ControllerStatus":
         LoginUnansweredError: It serves another client.
         RobolinkError: As :func:`bring_to_rest`, and as the transport.
     """
+    from robolink.controllers.epson.line import EpsonConversation, open_line
+
     opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock)
     talk = EpsonConversation(opened, timeout_s=means.login_s)
     try:
@@ -132,7 +134,7 @@ def stop_over_new_link(link: LinkUrl, means: StopMeans) -> "ControllerStatus":
         talk.close()
 
 
-def _tell_who(talk: EpsonConversation, met: Callable[[str], None]) -> None:
+def _tell_who(talk: "EpsonConversation", met: Callable[[str], None]) -> None:
     """Say which controller has stopped, if this firmware reports it without an Execute."""
     from robolink.controllers.epson.link import name_from
 

@@ -11,7 +11,7 @@ from robolink.controllers.softmotion.snapshots import Snapshots
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.controllers.stop_attempts import StopMeans, tell_what_is_said_twice
 from robolink.errors import Concerning
-from robolink.transport import LinkUrl, open_mailbox_link
+from robolink.transport import LinkUrl
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,6 +29,8 @@ def stop_over_new_link(link: LinkUrl, means: StopMeans) -> "ControllerStatus":
     Raises:
         RobolinkError: As :meth:`CommandSender.bring_to_rest`, and as the link.
     """
+    from robolink.transport import open_mailbox_link
+
     password = None
     if means.password:
         from robolink.model import Secret  # here, because no other mailbox has a login
